@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +25,9 @@ from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.language.series import expression_values
 from gearmbs.mechanism.language.syntax import Scope
 from gearmbs.mechanism.language.user_functions import raised_errors
+
+COUNTED = re.compile(r"\b(A[XYZ])\(\s*(\d+)\s*(?:,\s*(\d+)\s*)?\)", re.IGNORECASE)
+"""Angles in the text of a function whose full turns are counted, with the numbers of their markers."""
 
 NAMES = ("F1", "F2", "F3", "F4", "F5", "F6", "F7", "F8")
 
@@ -143,7 +148,7 @@ class RequestEvaluator:
         self._note(tape)
         starts = starting_angles(tape, self._turns, self._marker_named)
         named = [(function, self._marker_named(i), self._marker_named(j)) for function, i, j in tape.angles]
-        known = [known_turns(self.solution, *names) for names in named]
+        known = [known_turns(self.solution, *names, self._turns.get(names)) for names in named]
         with raised_errors(self.model.mechanism.functions.values()):
             return expression_values(
                 tape, starts, known, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
@@ -159,14 +164,30 @@ class RequestEvaluator:
         return found
 
     def turns(self) -> dict[tuple[str, str, str], float]:
-        """Return where the angles counted so far between markers of the deck end, rad."""
+        """Return where the angles counted so far between markers of the deck end, rad.
+
+        They are those that anything active asks for, and those that a statement may ask for later: a force about an
+        axis that is switched on or gets another function, and whatever a text of the deck names.
+        """
         numbered = {m.name for m in markers_of(self.model.mechanism) if m.number is not None}
         found = {}
-        for function, i, j in list(self._counted):
+        for function, i, j in dict.fromkeys([*self._counted, *self._asked_later()]):
             if {i, j} <= numbered | {""}:
                 arguments = ", ".join(f'"{name}"' if name else "0" for name in (i, j))
                 found[function, i, j] = float(self.expression(f"{function}({arguments})")[-1])
         return found
+
+    def _asked_later(self) -> Iterator[tuple[str, str, str]]:
+        """Yield the angles that statements of the deck may ask for, active or not, by function and names of markers."""
+        named = {m.number: m.name for m in markers_of(self.model.mechanism) if m.number is not None}
+        for statement in self.model.deck:
+            if isinstance(statement, st.Sforce | st.SpringDamper) and statement.type == "ROTATIONAL":
+                if statement.i in named and statement.j in named:
+                    yield "AZ", named[statement.i], named[statement.j]
+            for text in vars(statement).values():
+                for function, i, j in COUNTED.findall(text) if isinstance(text, str) else ():
+                    if int(i) in named and (not j or int(j) in named):
+                        yield function.upper(), named[int(i)], named[int(j)] if j else ""
 
     def _note(self, tape: Tape) -> None:
         """Remember the angles an expression counts."""

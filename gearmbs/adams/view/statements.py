@@ -21,6 +21,9 @@ def make_part(m: Deckmaker, item: Item) -> None:
     """PART, POINT_MASS or FLEX_BODY."""
     keyword = PART_KEYWORDS[item.kind]
     head = f"{keyword}/{m.id(item)}"
+    item.used.add("exact_coordinates")
+    if "exact_coordinates" in item.fields and not is_ground(item):
+        m.remark(item, "exact_coordinates is without effect: where joints contradict places, all parts are moved alike")
     if is_ground(item):
         for key in ("mass", "center_of_mass_marker", "density", "material_type", "location", "orientation", "planar"):
             item.used.add(key)

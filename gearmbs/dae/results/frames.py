@@ -227,20 +227,24 @@ def _counted(solution: Computed, t: float, y: np.ndarray, yp: np.ndarray, row: i
     return rdata
 
 
-def known_turns(solution: Computed, function: str, i: str, j: str) -> np.ndarray:
+def known_turns(solution: Computed, function: str, i: str, j: str, start: float | None = None) -> np.ndarray:
     """Return an angle less than half a turn off, by names of its markers, shape (m,), rad; NaN where nothing counts it.
 
-    That is as the run has counted it at its outputs, or where it starts if they are none of its own.
+    That is as the run has counted it at its outputs, or where it starts if they are none of its own. Constraints count
+    from half a turn on either side: where ``start`` says that the run begins some turns further, they are added.
     """
     result, angles = solution.result, solution.problem.counted
     found = np.full(len(result.t), np.nan)
     if angles is None or (function, i, j) not in angles.angles or not len(found):
         return found
     k = angles.angles.index((function, i, j))
+    begun = np.array([solution.problem.t0], dtype=float)
+    first = angles.values(begun, solution.problem.rdata[angles.places][None, :])[0, k]
+    further = 0.0 if start is None else 2.0 * np.pi * np.round((start - first) / (2.0 * np.pi))
     if result.counted is not None:
-        return angles.values(result.t, result.counted)[:, k]
+        return angles.values(result.t, result.counted)[:, k] + further
     if result.t[0] == solution.problem.t0:
-        found[0] = angles.values(result.t[:1], solution.problem.rdata[angles.places][None, :])[0, k]
+        found[0] = first + further
     return found
 
 

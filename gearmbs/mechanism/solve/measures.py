@@ -46,7 +46,10 @@ class Measures:
         wanted = np.arctan2(_dot(ai[:, :, 0], aj[:, :, 1]), _dot(ai[:, :, 0], aj[:, :, 0]))
         speed = _dot(self._spin(found.i) - self._spin(found.j), aj[:, :, 2])
         steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
-        known = known_turns(self.solution, "AZ", found.i.name, found.j.name)
+        known = known_turns(
+            self.solution, "AZ", found.i.name, found.j.name,
+            self.mechanism.turns.get(("AZ", found.i.name, found.j.name)),
+        )  # fmt: skip
         if not np.isnan(known).any():
             return wanted + 2 * np.pi * np.round((known - wanted) / (2 * np.pi))
         # each step is the one nearest to what the speeds make of it
@@ -219,7 +222,8 @@ class Measures:
         frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
         kin, acc = frame_motion(self.solution.evaluated, builder.build(Names()))
         starts = starting_angles(tape, self.mechanism.turns, marker_named)
-        known = [known_turns(self.solution, f, marker_named(i), marker_named(j)) for f, i, j in tape.angles]
+        named = [(f, marker_named(i), marker_named(j)) for f, i, j in tape.angles]
+        known = [known_turns(self.solution, *names, self.mechanism.turns.get(names)) for names in named]
         return expression_values(tape, starts, known, t, kin, acc, bodies, frames, y, marker_named)
 
     def _unknown(self, key: tuple) -> np.ndarray:
