@@ -148,7 +148,7 @@ class RequestEvaluator:
         self._note(tape)
         starts = starting_angles(tape, self._turns, self._marker_named)
         named = [(function, self._marker_named(i), self._marker_named(j)) for function, i, j in tape.angles]
-        known = [known_turns(self.solution, *names, self._turns.get(names)) for names in named]
+        known = [known_turns(self.solution, *names, self.model.mechanism.turns.get(names)) for names in named]
         with raised_errors(self.model.mechanism.functions.values()):
             return expression_values(
                 tape, starts, known, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
