@@ -16,7 +16,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
-from gearmbs.mechanism.solve.orbits import TIGHTER, Posed, SteadyMotion, check_along
+from gearmbs.mechanism.solve.orbits import Posed, SteadyMotion, check_along, orbit_tolerance
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.run.steady import posed_case
 from gearmbs.wording import warn
@@ -143,7 +143,7 @@ def steady_branch(
             raise ModelError(f"build: it returned {found!r}; it has to return a Case, or a Mechanism and its period")
         mechanism, period = found[0], quantity(found[1], "time", "period")
         usual, scale = chosen_accuracy(mechanism, (0.0, period), tol, None)
-        own = TIGHTER * usual if tol is None else usual
+        own = orbit_tolerance(usual) if tol is None else usual
         posed = Posed.of(mechanism, 0.0, None, True, "SI2", scale, own)
         advance = posed.advance(mechanism, period, None, own, "WSTIFF")
         check_repeats(posed.problem, period, advance)
