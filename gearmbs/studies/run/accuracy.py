@@ -120,9 +120,10 @@ def check_accurate(case: Case, accuracy: QuantityLike) -> float:
             f"case '{case.name}': accuracy = {accuracy!r}: the tolerance is chosen for it, but the case has "
             f"solver.tolerance = {case.solver.tolerance:g}; leave one of the two out"
         )
-    if case.contact.slices == FEWEST_SLICES - 1:
+    few = case.contact.slices is not None and case.contact.slices < FEWEST_SLICES
+    if few and case.changed(contact={"slices": None}).pair().face_slices > 1:
         raise CaseError(
-            f"case '{case.name}': accuracy = {accuracy!r}: what contact.slices = {case.contact.slices} are good for "
+            f"case '{case.name}': accuracy = {accuracy!r}: what contact.slices = {case.contact.slices} is good for "
             f"cannot be told from fewer; give {FEWEST_SLICES} or more, or leave slices out"
         )
     return wanted
@@ -188,7 +189,7 @@ def accurate_record(
         if worst <= wanted or attempt == ATTEMPTS - 1 or fine.tolerance <= LEAST_TOLERANCE:
             break
         tighter = fine.tolerance * float(np.clip(0.5 * wanted / worst, 1e-3, 1.0 / COARSER))
-        last = coarse, twin = fine, record
+        last = fine, record
         slices = slices if slices == 1 or given else 2 * slices - 1
         fine = _at(case, max(LEAST_TOLERANCE, tighter), slices)
         found = run(fine, kept | {level}, precision)
