@@ -99,9 +99,11 @@ EXCEPTIONS = {
 CIRCLES = {
     ("kernels.ahead", "kernels.calls", "kernels.jit"):
         "a kernel that is not there is compiled when it is called",
-    ("drivetrain.bodies", "drivetrain.build", "drivetrain.drivetrain", "drivetrain.kinematics", "drivetrain.on_shafts",
-     "drivetrain.placement", "drivetrain.planetary", "drivetrain.plants", "drivetrain.static.flow",
-     "drivetrain.static.rest", "drivetrain.torsional"):
+    ("bearings.bearing", "bearings.rating"):
+        "properties of Bearing, and the functions that carry them out",
+    ("drivetrain.bodies", "drivetrain.build", "drivetrain.description", "drivetrain.drivetrain",
+     "drivetrain.kinematics", "drivetrain.on_shafts", "drivetrain.placement", "drivetrain.planetary",
+     "drivetrain.plants", "drivetrain.static.flow", "drivetrain.static.rest", "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
     ("mechanism.compile", "mechanism.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.plant_names",

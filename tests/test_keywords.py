@@ -23,7 +23,7 @@ from gearmbs.drivetrain.drivetrain import Drivetrain, DrivetrainKeywords
 from gearmbs.gears import GearPair, GearSpec, IdealMesh, PlanetarySet
 from gearmbs.gears import ideal_mesh as im
 from gearmbs.gears.pair import PairKeywords, PaperKeywords
-from gearmbs.gears.planetary_set import PlanetaryKeywords
+from gearmbs.gears.planetary import PlanetaryKeywords
 from gearmbs.gears.spec import OfRadiiKeywords, RingKeywords
 from gearmbs.identify import fit
 from gearmbs.identify.cases import CaseProblem, ProblemKeywords

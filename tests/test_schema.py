@@ -14,7 +14,7 @@ import pytest
 from pydantic import ValidationError
 
 import gearmbs
-from gearmbs.drivetrain.drivetrain import make_description
+from gearmbs.drivetrain.description import make_description
 from gearmbs.gears import GearSpec
 from gearmbs.schema.described import (
     Described,

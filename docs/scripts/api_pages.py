@@ -79,8 +79,8 @@ MORE = {
         "gearmbs.gears.iso6336": EVERYTHING,
     },
     "gearmbs.bearings": {
-        "gearmbs.bearings.catalogue": EVERYTHING,
-        "gearmbs.bearings.bearing": [
+        "gearmbs.bearings.designations.catalogue": EVERYTHING,
+        "gearmbs.bearings.rating": [
             "dynamic_rating",
             "static_rating",
             "load_factors",

@@ -1,7 +1,4 @@
 from .bearing import Bearing as Bearing
-from .bearing import equivalent_load as equivalent_load
-from .bearing import mean_load as mean_load
-from .bearing import rating_life as rating_life
 from .defects import DEFECTS as DEFECTS
 from .defects import Defect as Defect
 from .defects import Line as Line
@@ -19,6 +16,9 @@ from .kinds import BearingError as BearingError
 from .laws_kernel import PointContact as PointContact
 from .laws_kernel import groove_contact as groove_contact
 from .layout import spall_depth as spall_depth
+from .rating import equivalent_load as equivalent_load
+from .rating import mean_load as mean_load
+from .rating import rating_life as rating_life
 from .statics import BearingState as BearingState
 from .statics import BearingStatics as BearingStatics
 from .statics import stiffness_matrix as stiffness_matrix

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from gearmbs.bearings import layout as B
-from gearmbs.bearings.bearing import Bearing, equivalent_load, mean_load, rating_life
+from gearmbs.bearings.bearing import Bearing
 from gearmbs.bearings.clearance import ClearanceForce
 from gearmbs.bearings.defects import INNER, OUTER, Defect, LooseFit, as_defects
 from gearmbs.bearings.kinds import LOOSEST, BearingError, require
+from gearmbs.bearings.rating import equivalent_load, mean_load, rating_life
 from gearmbs.bearings.settings import BearingSettings, BearingTables, bearing_settings, pack, reals_by
 from gearmbs.dae.equations.loads.forces import COUNT, DISSIPATED, STORED, Diagnostic
 from gearmbs.mechanism.parts.bodies import Body

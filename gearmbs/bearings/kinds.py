@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gearmbs.bearings.boundary import size_of
+from gearmbs.bearings.designations.boundary import size_of
 
 
 class BearingError(ValueError):
@@ -35,7 +35,7 @@ Bearing = Any
 
 @dataclass(frozen=True)
 class Usual:
-    """What elements usually are in bearings of a kind; see `gearmbs.bearings.estimate`.
+    """What elements usually are in bearings of a kind; see `gearmbs.bearings.designations.estimate`.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Known:
     asked : tuple of str
         Those to be counted or measured.
     rated : str
-        Series of the ratings in `gearmbs.bearings.boundary`, if it is another one than that of the dimensions.
+        Series of the ratings in `gearmbs.bearings.designations.boundary`, if it is another than that of dimensions.
     usual : Usual, optional
         Elements as they usually are, if others than those of the kind.
     raceway : float, optional
@@ -113,7 +113,7 @@ class Kind:
     designation : re.Pattern, optional
         Beginning of designations: its letters and digits of the series, code of the bore.
     series : dict
-        Series by these, as of `gearmbs.bearings.boundary`.
+        Series by these, as of `gearmbs.bearings.designations.boundary`.
     known : callable, optional
         ``known(found, boundary)`` returns what such a designation fixes.
     usual : Usual
@@ -122,7 +122,7 @@ class Kind:
     unclassed : str
         Why a class of radial clearance says nothing of such bearings; empty if it does.
     classes : str
-        Table of the classes of radial clearance, see `gearmbs.bearings.classes`.
+        Table of the classes of radial clearance, see `gearmbs.bearings.designations.classes`.
     tapers : bool
         Whether a K among the suffixes is a tapered bore, whose classes have limits of their own.
     """

@@ -10,6 +10,9 @@ from .connections import IdealBearing as IdealBearing
 from .connections import RigidCoupling as RigidCoupling
 from .connections import RollingContactBearing as RollingContactBearing
 from .connections import TorsionalShaft as TorsionalShaft
+from .description import Description as Description
+from .description import RunSettings as RunSettings
+from .description import read_description as read_description
 from .drives import DRIVES as DRIVES
 from .drives import CircuitMotor as CircuitMotor
 from .drives import ControlledDrive as ControlledDrive
@@ -18,10 +21,7 @@ from .drives import Drive as Drive
 from .drives import InductionMotor as InductionMotor
 from .drives import SpeedDrive as SpeedDrive
 from .drives import TorqueDrive as TorqueDrive
-from .drivetrain import Description as Description
 from .drivetrain import Drivetrain as Drivetrain
-from .drivetrain import RunSettings as RunSettings
-from .drivetrain import read_description as read_description
 from .housing import Housing as Housing
 from .housing import HousingMode as HousingMode
 from .housing import Mount as Mount

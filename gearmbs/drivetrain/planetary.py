@@ -22,8 +22,9 @@ from gearmbs.drivetrain.part import Part, errors_named, require
 from gearmbs.drivetrain.parts import contact_law, flank_friction
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import turn_z
+from gearmbs.gears.planetary import planetary
 from gearmbs.gears.planetary_mechanism import Members, PinBearing, Support, add_planets, set_masses
-from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet, planetary
+from gearmbs.gears.planetary_set import MEMBERS, PlanetarySet
 from gearmbs.gears.spec import GearSpec
 from gearmbs.schema.described import check_keys
 from gearmbs.schema.quantities import Measure

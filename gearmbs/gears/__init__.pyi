@@ -10,13 +10,13 @@ from .mesh import OperatingPoint as OperatingPoint
 from .mesh_tables import MeshTables as MeshTables
 from .mesh_tables import mesh_tables as mesh_tables
 from .pair import GearPair as GearPair
+from .planetary import planetary as planetary
 from .planetary_mechanism import ElasticRim as ElasticRim
 from .planetary_mechanism import RimModes as RimModes
 from .planetary_mechanism import RingMeshes as RingMeshes
 from .planetary_mechanism import Support as Support
 from .planetary_mechanism import planetary_mechanism as planetary_mechanism
 from .planetary_set import PlanetarySet as PlanetarySet
-from .planetary_set import planetary as planetary
 from .spec import GearSpec as GearSpec
 from .spec import Material as Material
 from .spec import involute as involute

@@ -25,7 +25,7 @@ def bearings_asked(texts: list[str], shafts: list[str] | None, train: Path | Non
     """Return bearings, ratios of other shafts and, of a drivetrain, the speed, as `diagnose_bearing` takes them."""
     asked: dict[str, Any] = {"bearing": {}, "shafts": None}
     if train is not None:
-        from gearmbs.drivetrain.drivetrain import read_description
+        from gearmbs.drivetrain.description import read_description
 
         asked = read_description(train).train.kinematics.for_bearings()
     asked["bearing"] = {**asked["bearing"], **bearing_list(texts)}

@@ -436,7 +436,7 @@ def campbell(
         check_targets(out=out)
         import numpy as np
 
-        from gearmbs.drivetrain.drivetrain import read_description
+        from gearmbs.drivetrain.description import read_description
         from gearmbs.studies.mode_names import ranked_crossings
         from gearmbs.studies.train_views import train_campbell
         from gearmbs.units import to_si

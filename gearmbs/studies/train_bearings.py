@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.bearings import Bearing, mean_load, rating_life
-from gearmbs.bearings.bearing import paired_thrust
 from gearmbs.bearings.kinds import TILTED, BearingError
+from gearmbs.bearings.rating import paired_thrust
 from gearmbs.drivetrain import Drivetrain
 
 UNLOADED = 1e-3

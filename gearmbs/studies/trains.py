@@ -17,7 +17,7 @@ from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError, Laser, RunSettings
-from gearmbs.drivetrain.drivetrain import Description, read_description
+from gearmbs.drivetrain.description import Description, read_description
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, differentials
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.files import json_value

@@ -7,8 +7,8 @@ import warnings
 import pytest
 
 from gearmbs.bearings import Bearing, BearingError
-from gearmbs.bearings.bearing import dynamic_rating, equivalent_load, rating_life
-from gearmbs.bearings.boundary import SAME, size_of, sizes
+from gearmbs.bearings.designations.boundary import SAME, size_of, sizes
+from gearmbs.bearings.rating import dynamic_rating, equivalent_load, rating_life
 from tests.says import says
 
 NAMED = """

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from gearmbs.bearings import Bearing, BearingError, equivalent_load, groove_contact, mean_load, rating_life
-from gearmbs.bearings.bearing import dynamic_rating, load_factors
-from gearmbs.bearings.catalogue import ELEMENTS
+from gearmbs.bearings.designations.catalogue import ELEMENTS
 from gearmbs.bearings.laws_kernel import line_contact
+from gearmbs.bearings.rating import dynamic_rating, load_factors
 from tests.says import says
 
 MULTIPLES = {

@@ -10,8 +10,8 @@ import pytest
 
 import gearmbs
 from gearmbs.bearings import Bearing, BearingError, BearingStatics, RollingBearing
-from gearmbs.bearings.bearing import dynamic_rating, equivalent_load
 from gearmbs.bearings.kinds import KINDS, Known
+from gearmbs.bearings.rating import dynamic_rating, equivalent_load
 from gearmbs.mechanism import Mechanism
 from tests.says import says
 
@@ -76,7 +76,7 @@ def test_no_other_module_tells_kinds_apart():
         for name in word.findall(path.read_text(encoding="utf-8"))
         if path.name != "kinds.py"
     }
-    assert found <= {"bearings/catalogue.py: angular contact", "bearings/bearing.py: deep groove"}
+    assert found <= {"bearings/designations/catalogue.py: angular contact", "bearings/bearing.py: deep groove"}
 
 
 @pytest.mark.parametrize("kind", ["angular contact", "tapered roller"])

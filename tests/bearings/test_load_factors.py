@@ -8,8 +8,8 @@ import warnings
 import pytest
 
 from gearmbs.bearings import Bearing, BearingError, equivalent_load
-from gearmbs.bearings.bearing import induced_thrust, load_factors, paired_thrust
 from gearmbs.bearings.kinds import ANGULAR, DOUBLE_ANGULAR, TILTED
+from gearmbs.bearings.rating import induced_thrust, load_factors, paired_thrust
 from tests.says import says
 
 BALLS = {"elements": 12, "element_diameter": "10 mm", "pitch_diameter": "46 mm"}

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gearmbs.bearings import Bearing, BearingError, BearingStatics, OffSize, RollingBearing, Waviness
-from gearmbs.bearings.bearing import dynamic_rating, equivalent_load, load_factors, rating_life, static_rating
-from gearmbs.bearings.boundary import size_of
+from gearmbs.bearings.designations.boundary import size_of
+from gearmbs.bearings.rating import dynamic_rating, equivalent_load, load_factors, rating_life, static_rating
 from gearmbs.mechanism import Mechanism, static_equilibrium
 from tests.says import says
 

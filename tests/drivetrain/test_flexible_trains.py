@@ -21,7 +21,7 @@ from gearmbs.drivetrain import (
     TorqueLoad,
     Wheel,
 )
-from gearmbs.drivetrain.drivetrain import read_description
+from gearmbs.drivetrain.description import read_description
 from gearmbs.flexible import Interface, block_mesh, mnf_of, nodes_where, reduce_model, solid_model, write_mnf
 from gearmbs.gears import GearSpec, IdealMesh
 from gearmbs.studies import mode_table, named_modes, ranked_crossings, run_train, train_campbell, train_modes

@@ -20,7 +20,7 @@ from gearmbs.drivetrain import (
     TorsionalModel,
     TorsionalSpring,
 )
-from gearmbs.drivetrain.drivetrain import make_description
+from gearmbs.drivetrain.description import make_description
 from gearmbs.flexible import ShaftSection
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, IdealMesh, loaded_transmission_error, planetary
 from gearmbs.gears.iso6336 import iso_mesh_stiffness, iso_single_stiffness

@@ -28,7 +28,7 @@ from gearmbs.drivetrain import (
     TorqueLoad,
     Wheel,
 )
-from gearmbs.drivetrain.drivetrain import read_description
+from gearmbs.drivetrain.description import read_description
 from gearmbs.drivetrain.plants import resting
 from gearmbs.flexible import box_model
 from gearmbs.gears import GearPair, GearSpec, IdealMesh, PlanetarySet, Support, planetary, planetary_mechanism

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearmbs.drivetrain.backlash import BacklashOscillator
+from gearmbs.studies.presets.backlash import BacklashOscillator
 from gearmbs.studies.presets.rattle import MODELS, RattleSettings, rattle, rattle_map, rattle_table, rattle_train
 from tests.studies.presets import agrees_with_its_file
 

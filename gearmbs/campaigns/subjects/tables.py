@@ -29,7 +29,7 @@ from gearmbs.units import readings, si_unit, to_si
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.drivetrain.drivetrain import Description
+    from gearmbs.drivetrain.description import Description
     from gearmbs.studies.planetary import PlanetaryRun
 
 
@@ -233,7 +233,7 @@ class DrivetrainSubject(TablesSubject):
 
     def made(self, tables: dict[str, Any]) -> Description:
         """Return the drivetrain and its run."""
-        from gearmbs.drivetrain.drivetrain import make_description
+        from gearmbs.drivetrain.description import make_description
         from gearmbs.studies.case.tooth_faults import tooth_fault
         from gearmbs.studies.trains import check_record
 

@@ -25,7 +25,7 @@ import numpy as np
 from gearmbs.dae.analyses.coordinates import spatial
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Reduced
-from gearmbs.dae.analyses.plant import Realised
+from gearmbs.dae.analyses.realisation import Realised
 from gearmbs.dae.analyses.turning import skew
 from gearmbs.dae.equations.rotation import POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.model.system import accelerations

@@ -12,7 +12,8 @@ import numpy as np
 from gearmbs.dae.analyses.coordinates import chosen
 from gearmbs.dae.analyses.kinematics import Instant
 from gearmbs.dae.analyses.linearisation import Inputs, reduce, warn_of_varying
-from gearmbs.dae.analyses.plant import Asked, LinearPlant, OperatingPoint, lowered, poles_of, realised
+from gearmbs.dae.analyses.plant import LinearPlant, OperatingPoint, poles_of
+from gearmbs.dae.analyses.realisation import Asked, lowered, realised
 from gearmbs.dae.analyses.response import response_of
 from gearmbs.dae.analyses.turning import turning
 from gearmbs.dae.equations.rotation import POSE_W

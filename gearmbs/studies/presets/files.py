@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gearmbs.drivetrain import Drivetrain, Housing
-from gearmbs.drivetrain.drivetrain import read_description
+from gearmbs.drivetrain.description import read_description
 from gearmbs.drivetrain.part import Part
 from gearmbs.schema.described import read_toml
 

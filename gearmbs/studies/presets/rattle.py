@@ -15,10 +15,10 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.drivetrain import Drivetrain, ShaftTorque
-from gearmbs.drivetrain.backlash import BacklashOscillator
 from gearmbs.mechanism import Mechanism, static_equilibrium
 from gearmbs.mechanism.parts.functions import constant
 from gearmbs.progress import waiting
+from gearmbs.studies.presets.backlash import BacklashOscillator
 from gearmbs.studies.presets.files import preset_train, with_values
 
 MODELS = ("equivalent", "torsional", "frequency", "multibody")

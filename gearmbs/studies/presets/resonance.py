@@ -29,13 +29,13 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.drivetrain import Drivetrain
-from gearmbs.drivetrain.backlash import BacklashOscillator
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.transmission import TransmissionError, loaded_transmission_error
 from gearmbs.mechanism import Mechanism
 from gearmbs.schema.described import Described
 from gearmbs.schema.quantities import Measure
 from gearmbs.signals.analysis.report import markdown_table
+from gearmbs.studies.presets.backlash import BacklashOscillator
 from gearmbs.studies.presets.files import preset_train, with_values
 from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.store import save_study

@@ -27,7 +27,7 @@ from gearmbs.dae.methods import (
     integrators_table,
 )
 from gearmbs.dae.problem import ModelError
-from gearmbs.drivetrain.drivetrain import RunSettings
+from gearmbs.drivetrain.description import RunSettings
 from gearmbs.drivetrain.part import DrivetrainError
 from gearmbs.mechanism import Mechanism
 from gearmbs.wording import any_of

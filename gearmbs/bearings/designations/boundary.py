@@ -1,6 +1,6 @@
 """Boundary dimensions of rolling bearings by series and code of the bore, and ratings that makers print.
 
-They stand in ``designations.csv``, one row for a size of a series: bore d, outside diameter D and width B (of tapered
+They stand in ``sizes.csv``, one row for a size of a series: bore d, outside diameter D and width B (of tapered
 roller bearings T, of thrust bearings H), mm; C and C_0, kN, and the limit e = 1.5 tan(a) of the load factors where a
 maker prints them, and whose they are; of needle roller bearings the raceway F on the inner ring. Dimensions are those
 of ISO 15, ISO 355 and ISO 104, which all makers keep: each row is in two catalogues, or in one and in the dimension
@@ -81,7 +81,7 @@ def sizes() -> dict[tuple[str, str], Size]:
         return float(f"{text}e{power}") if text else None
 
     found = {}
-    text = files("gearmbs.bearings").joinpath("designations.csv").read_text(encoding="utf-8")
+    text = files("gearmbs.bearings.designations").joinpath("sizes.csv").read_text(encoding="utf-8")
     for row in csv.DictReader(text.splitlines()):
         found[row["series"], row["code"]] = Size(
             float(f"{row['d']}e-3"), float(f"{row['D']}e-3"), float(f"{row['B']}e-3"), number(row["C"], 3),

@@ -4,8 +4,8 @@ Number and size of the elements are standardised nowhere. What is usual follows 
 a share of (D - d) on the mean diameter, which fill a share of the circle of their centres. Where a rating is known, the
 size is moved so that ISO 281 gives it, or rollers get the length that does; what is moved stays within `ROOM`.
 
-Of the ten deep groove bearings whose elements are known (`gearmbs.bearings.catalogue.ELEMENTS`) the number of balls is
-right and their diameter within 1 % of eight, 3 and 7 % of the others. Others may have one element more or less, which
+Of the ten deep groove bearings whose elements are known (``ELEMENTS`` of the catalogue) the number of balls is right
+and their diameter within 1 % of eight, 3 and 7 % of the others. Others may have one element more or less, which
 moves the lines of the races by 1/Z and the radial stiffness, which goes with Z^(2/3) d^(1/3), by two thirds of that.
 The life goes with C, which is the maker's where it is known.
 """
@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from gearmbs.bearings.boundary import Size
+from gearmbs.bearings.designations.boundary import Size
 from gearmbs.bearings.kinds import KINDS, Usual
 from gearmbs.units import to_si
 

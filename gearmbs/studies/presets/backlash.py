@@ -102,7 +102,7 @@ def oscillate(state, numbers, stiffness, error, backlash, step, start_speed, end
 
 @dataclass(frozen=True)
 class BacklashOscillator:
-    """A pair as one mass on its mesh with backlash; see `gearmbs.drivetrain.backlash` for the equation.
+    """A pair as one mass on its mesh with backlash; see `gearmbs.studies.presets.backlash` for the equation.
 
     Parameters
     ----------
