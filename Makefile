@@ -7,7 +7,7 @@ OUT ?= out
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: paper test quick wheel lint types bench docs clean
+.PHONY: paper test quick wheel dist lint types bench docs clean
 
 # it compiles the kernels that it uses, half of all
 paper: $(VENV)/.installed
@@ -25,6 +25,11 @@ quick: $(VENV)/.installed-dev
 # what a user installs, tried away from the checkout
 wheel: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest tests/test_wheel.py
+
+# what is published for Linux on x86-64: a wheel with all kernels, compiled; some minutes
+dist: $(VENV)/.installed-dev
+	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	$(BIN)/python -m gearmbs.kernels.ship dist/gearmbs-*-none-any.whl --out dist
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

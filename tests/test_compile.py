@@ -196,6 +196,28 @@ def test_announced_once(missing, monkeypatch, capsys):
 
 
 @pytest.mark.slow
+def test_a_processor_without_what_shipped_kernels_need_is_told(missing, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(compiling, "compile_entries", lambda wanted, report: None)
+    monkeypatch.setattr(cache, "SHIPPED", tmp_path)
+    for chosen in ("CPU_NAME", "CPU_FEATURES"):
+        monkeypatch.setattr(cache.config, chosen, None)
+    has = dict.fromkeys(cache.NEEDED, True)
+    monkeypatch.setattr(cache.llvmlite.binding, "get_host_cpu_features", lambda: has)
+    assert cache.shipped.__wrapped__()
+    assert compiling.compile_missing(missing)
+    assert "has no" not in capsys.readouterr().err
+    has["fma"] = False
+    assert not cache.shipped.__wrapped__()
+    assert compiling.compile_missing(missing)
+    said = capsys.readouterr().err
+    assert "x86-64-v3" in said
+    assert "has no fma" in said
+    has["fma"] = True
+    monkeypatch.setattr(cache.config, "CPU_NAME", "generic")
+    assert not cache.shipped.__wrapped__()
+
+
+@pytest.mark.slow
 def test_helpers_that_fail_are_not_started_again(missing, monkeypatch, capsys):
     started = []
     monkeypatch.setattr(sys, "executable", "/does/not/exist")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -13,9 +15,12 @@ import textwrap
 import zipfile
 from pathlib import Path
 
+import llvmlite.binding
+import numpy as np
 import pytest
 
-from gearmbs.kernels.cache import folders
+from gearmbs.kernels.cache import NEEDED, folders
+from gearmbs.kernels.ship import ship
 
 ROOT = Path(__file__).parent.parent
 
@@ -75,15 +80,21 @@ def put_kernels(folder: Path) -> None:
                 shutil.copy(file, place)
 
 
-@pytest.fixture(scope="module")
-def environment(wheel, tmp_path_factory):
-    """Install the wheel alone; what it depends on is taken from the environment of the tests."""
-    folder = tmp_path_factory.mktemp("installed")
+def installed(wheel: Path, folder: Path) -> tuple[Path, Path]:
+    """Make an environment with a wheel in it; return its Python, and where its packages are."""
     run(sys.executable, "-m", "venv", "--without-pip", folder / "venv", folder=folder)
     python = folder / "venv" / "bin" / "python"
     run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", wheel, folder=folder)
     site = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", folder=folder).strip())
     (site / "dependencies.pth").write_text("".join(f"{p}\n" for p in sys.path if p.endswith("site-packages")))
+    return python, site
+
+
+@pytest.fixture(scope="module")
+def environment(wheel, tmp_path_factory):
+    """Install the wheel alone; what it depends on is taken from the environment of the tests."""
+    folder = tmp_path_factory.mktemp("installed")
+    python, site = installed(wheel, folder)
     put_kernels(site)
     assert run(python, "-c", "import gearmbs; print(gearmbs.__file__)", folder=folder).startswith(str(site))
     return folder
@@ -165,3 +176,61 @@ def test_simulates_and_shows(environment):
     run(environment / "venv" / "bin" / "python", "-c", textwrap.dedent(code), folder=environment)
     for page in ("pendulum", "swing", "mesh", "wheel"):
         assert (environment / f"{page}.html").stat().st_size > 10_000
+
+
+ROTATION = """
+    import json
+    import numpy as np
+    from gearmbs.dae.equations.rotation import REFERENCE_IDENTITY, rotation_matrix
+    from gearmbs.kernels import cache
+    matrix = np.zeros(9)
+    rotation_matrix(0.1, 0.2, 0.3, REFERENCE_IDENTITY, matrix, 0)
+    print(json.dumps([cache.target()[0], matrix.tolist()]))
+"""
+"""Calls one kernel; tells for which processor kernels are, and what came out."""
+
+
+@pytest.fixture(scope="module")
+def with_kernels(wheel, tmp_path_factory):
+    """Put the kernels of one module into the wheel, and install that."""
+    folder = tmp_path_factory.mktemp("shipped")
+    made = ship(wheel, folder / "dist", ["gearmbs.dae.equations.rotation"])
+    python, site = installed(made, folder)
+    return made, python, site / "gearmbs" / "kernels" / "shipped"
+
+
+@pytest.mark.skipif(platform.system() != "Linux" or platform.machine() != "x86_64", reason="POSIX: kernels are shipped")
+def test_a_wheel_with_kernels_compiles_nothing(with_kernels, tmp_path, monkeypatch):
+    """It is for one Python and one system; an empty home finds its kernels; who names a processor gets that one's."""
+    made, python, along = with_kernels
+    version = f"cp{sys.version_info.major}{sys.version_info.minor}"
+    assert made.name.endswith(f"-{version}-{version}-manylinux_2_28_x86_64.whl")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    for chosen in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"):
+        monkeypatch.delenv(chosen, raising=False)
+
+    kept: set[Path] = set()
+
+    def called() -> tuple[bool, str, list[float]]:
+        """Return whether the kernel was compiled, for which processor it is, and its result."""
+        told = json.loads(run(python, "-c", textwrap.dedent(ROTATION), folder=tmp_path))
+        new = set((tmp_path / "home").rglob("*rotation_matrix*.entry")) - kept
+        kept.update(new)
+        return bool(new), *told
+
+    has = llvmlite.binding.get_host_cpu_features()
+    fits = all(has.get(name) for name in NEEDED)
+    compiled, processor, found = called()
+    assert (not compiled, processor == "x86-64-v3") == (fits, fits)
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    compiled, processor, again = called()
+    assert (compiled, processor) == (True, "generic")
+    assert np.allclose(found, again, rtol=0.0, atol=1e-15)
+    # what cannot be read is compiled for this machine, and kept in the home
+    monkeypatch.delenv("NUMBA_CPU_NAME")
+    for file in along.glob("*rotation_matrix*.entry"):
+        file.write_bytes(b"cut")
+    compiled, _, again = called()
+    assert compiled == fits
+    assert not called()[0]
+    assert np.allclose(found, again, rtol=0.0, atol=1e-15)

@@ -148,6 +148,11 @@ def compile_missing(kernel: Kernel) -> bool:
             told = now
             print(f"gearmbs: {line.partition(' ')[0]} kernels after {now:.0f} s", file=sys.stderr, flush=True)
 
+    if lacking := cache.lacking():
+        _say_once(
+            f"the kernels that came with this installation are for processors of level {cache.COMMON[0]}, and this one "
+            f"has no {', '.join(lacking)}"
+        )
     _say_once("compiling numerical kernels that are not on disk yet; they are kept there")
     try:
         compile_entries([*{kernel, *wanted}], report)
@@ -210,6 +215,8 @@ def prune(days: float, package: str = "gearmbs") -> tuple[int, int]:
     oldest = time.time() - 86400.0 * days
     files = size = 0
     for folder in cache.folders(package):
+        if folder == cache.SHIPPED:
+            continue
         for path in sorted(folder.glob("*")) if folder.is_dir() else ():
             # another process may delete it first
             with contextlib.suppress(OSError):
@@ -225,7 +232,7 @@ def _check_folders(packages: set[str]) -> None:
 
     for package in sorted(packages):
         if not cache.writable(package):
-            places = ", ".join(str(folder) for folder in cache.folders(package))
+            places = ", ".join(str(folder) for folder in cache.own_folders(package))
             raise RuntimeError(
                 f"kernels cannot be kept, for none of their folders can be written: {places}; "
                 "set NUMBA_CACHE_DIR to one that can"

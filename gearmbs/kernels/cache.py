@@ -1,8 +1,8 @@
 """Compiled kernels on disk, under a digest of all that they are made of.
 
 A digest covers the byte code of the function and of every function it calls, the values of the globals they name, the
-declared types and options, the versions of Python, numba and LLVM, the processor, and the source of the modules that
-compile and keep kernels. So an edit never finds stale code, a comment or docstring of a kernel costs nothing, and
+declared types and options, the minor versions of Python, numba and LLVM, the processor, and the source of the modules
+that compile and keep kernels. So an edit never finds stale code, a comment or docstring of a kernel costs nothing, and
 nothing on disk is ever changed or deleted but a file that cannot be read: processes, checkouts and users may share a
 folder. Looking costs no file work before the first kernel is called.
 
@@ -10,6 +10,10 @@ The folder is ``$NUMBA_CACHE_DIR`` if that is set; else ``gearmbs`` in the user'
 and checkouts of a user share; or, where that cannot be written, ``__pycache__/kernels`` of the package that the kernel
 belongs to. What lies there is found in any case. Where nothing can be written, kernels are compiled for the process
 alone.
+
+A wheel may bring kernels along, in `SHIPPED`, made for the processor `COMMON` (`gearmbs.kernels.ship`). They come first
+wherever the processor has its instructions and none was chosen by ``NUMBA_CPU_NAME`` or ``NUMBA_CPU_FEATURES``, so that
+all such machines run the same code.
 """
 
 from __future__ import annotations
@@ -30,17 +34,27 @@ from pathlib import Path
 from typing import Any
 
 import llvmlite
+import llvmlite.binding
 import numba
 import numpy as np
 from numba.core import config, dispatcher, serialize
 
 from gearmbs.kernels.locks import held
 
-FORMAT = "3"
+FORMAT = "4"
 """To be raised when the files or what they hold change."""
 
 MAKERS = ("jit", "library", "cache", "late")
 """Modules of this package that make what is kept; an edit of theirs makes all of it anew."""
+
+SHIPPED = Path(__file__).with_name("shipped")
+"""Where kernels are that a wheel brought along; there are none in a checkout."""
+
+COMMON = ("x86-64-v3", "")
+"""Name and further instructions of the processor that they are made for."""
+
+NEEDED = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt")
+"""Instructions of `COMMON` beyond those of every 64-bit processor of Intel's kind (x86-64 psABI, level 3)."""
 
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
 """Settings of numba's that change its machine code."""
@@ -52,18 +66,38 @@ _parts: dict[str, Any] = {}
 
 
 def target() -> tuple[str, str]:
-    """Return name and instructions of the processor that kernels are made for."""
-    _, name, features = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
-    return name, features
+    """Return name and instructions of the processor that the package's kernels are made for."""
+    return COMMON if shipped() else _own_target()[1:]
+
+
+def _own_target() -> tuple[str, str, str]:
+    """Return the kind of system, and name and instructions of the processor that is compiled for here."""
+    return numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+
+
+def lacking() -> list[str]:
+    """Return which instructions of `COMMON` the processor has not; nothing if no kernels came along."""
+    if not SHIPPED.is_dir():
+        return []
+    has = llvmlite.binding.get_host_cpu_features()
+    return [name for name in NEEDED if not has.get(name)]
 
 
 @functools.cache
-def setting() -> str:
-    """Return what all kernels of a process depend on."""
-    magic = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+def shipped() -> bool:
+    """Return whether kernels came along that run here, and none are asked for that are made for another processor."""
+    return SHIPPED.is_dir() and config.CPU_NAME is None and config.CPU_FEATURES is None and not lacking()
+
+
+@functools.cache
+def setting(processor: tuple[str, str] | None = None) -> str:
+    """Return what all kernels for a processor depend on; default: the one that is compiled for here."""
+    system, *own = _own_target()
+    magic = (system, *(processor or own))
     options = [(name, getattr(config, name, None)) for name in OPTIONS]
     made_by = [hashlib.sha256(Path(__file__).with_name(f"{name}.py").read_bytes()).hexdigest() for name in MAKERS]
-    versions = (numba.__version__, llvmlite.__version__, platform.python_version())
+    # a patch release changes no machine code that others have to fit
+    versions = [v.split(".")[:2] for v in (numba.__version__, llvmlite.__version__, platform.python_version())]
     return repr((FORMAT, versions, magic, options, made_by))
 
 
@@ -204,17 +238,28 @@ def _source(module: str) -> str:
 # where it is kept
 
 
-def file_name(kernel: Any, kind: str, args: tuple) -> str:
-    """Return the name of the file of an entry or part."""
+def file_name(kernel: Any, kind: str, args: tuple, processor: tuple[str, str] | None = None) -> str:
+    """Return the name of the file of an entry or part; default: for the processor that is compiled for here."""
     told = [_type(t) for t in args]
-    text = repr((setting(), identity(kernel), kind, told))
+    text = repr((setting(processor), identity(kernel), kind, told))
     digest = hashlib.sha256(text.encode()).hexdigest()[:24]
     return f"{kernel.__module__.partition('.')[2] or kernel.__module__}.{kernel.__name__}-{digest}.{kind}"
+
+
+def _names(kernel: Any, kind: str, args: tuple) -> list[str]:
+    """Return the names under which an entry or part may be found: what came along comes first."""
+    return [file_name(kernel, kind, args, processor) for processor in ([COMMON, None] if shipped() else [None])]
 
 
 @functools.cache
 def folders(package: str) -> tuple[Path, ...]:
     """Return where kernels of a package may be found; the last one is where new ones go, if it can be written."""
+    along = (SHIPPED,) if package == __package__.partition(".")[0] and shipped() else ()
+    return (*along, *own_folders(package))
+
+
+def own_folders(package: str) -> tuple[Path, ...]:
+    """Return where kernels of a package are that were compiled by its users; the last one is where new ones go."""
     if config.CACHE_DIR:
         return (Path(config.CACHE_DIR) / package,)
     home = getattr(sys.modules.get(package), "__file__", None)
@@ -269,12 +314,14 @@ def _package(kernel: Any) -> str:
 
 def stored(kernel: Any, kind: str, args: tuple) -> bool:
     """Return whether an entry or part is on disk."""
-    return any((folder / file_name(kernel, kind, args)).exists() for folder in folders(_package(kernel)))
+    names = _names(kernel, kind, args)
+    return any((folder / name).exists() for name in names for folder in folders(_package(kernel)))
 
 
 def load(kernel: Any, kind: str, args: tuple, rebuild: Callable) -> Any:
     """Return an entry or part from disk, or None."""
-    return _load(file_name(kernel, kind, args), _package(kernel), kind, rebuild)
+    found = (_load(name, _package(kernel), kind, rebuild) for name in _names(kernel, kind, args))
+    return next((made for made in found if made is not None), None)
 
 
 def _load(file: str, package: str, kind: str, rebuild: Callable) -> Any:

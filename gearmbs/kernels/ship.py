@@ -1,0 +1,109 @@
+"""Put compiled kernels into a wheel: ``python -m gearmbs.kernels.ship WHEEL``.
+
+The kernels are those of the wheel's own sources, all of them, compiled for `gearmbs.kernels.cache.COMMON`. They fit one
+minor version of Python and of numba, and one system; so the wheel gets tags of Python and system, and stands beside the
+one for all. With another numba they are not found, and kernels are compiled as without them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from gearmbs.kernels import cache
+
+KEPT = ("*.entry", "*.part")
+"""Machine code, and the LLVM code that kernels of a user's own are linked with."""
+
+SYSTEM = "manylinux_2_28_x86_64"
+"""Kernels call functions of the C library's mathematics, and of numba: its wheels ask for this much, so no less."""
+
+
+class ShippingError(RuntimeError):
+    """A wheel that kernels cannot be put into."""
+
+
+def ship(wheel: Path, folder: Path, modules: list[str] | None = None) -> Path:
+    """Write a wheel with compiled kernels beside one without; return its path.
+
+    Parameters
+    ----------
+    wheel : Path
+        A wheel of this package for all systems.
+    folder : Path
+        Where the new one is written.
+    modules : list of str, optional
+        Compile what these modules need; by default, all of the package.
+
+    Raises
+    ------
+    ShippingError
+        If there is no such wheel, if this machine is not one whose kernels others can use, or if a kernel cannot be
+        compiled.
+    """
+    machine = os.uname() if hasattr(os, "uname") else None
+    if machine is None or (machine.sysname, machine.machine) != ("Linux", "x86_64"):
+        raise ShippingError("kernels are shipped for Linux on x86-64; run this there")
+    if not wheel.is_file():
+        raise ShippingError(f"wheel is {str(wheel)!r}; give one that pip wheel has made")
+    with tempfile.TemporaryDirectory() as place:
+        _run(sys.executable, "-m", "wheel", "unpack", "--dest", place, str(wheel))
+        (root,) = Path(place).iterdir()
+        kernels = root / "kernels-of-this-wheel"
+        _compile(root, kernels, modules)
+        along = root / "gearmbs" / "kernels" / cache.SHIPPED.name
+        along.mkdir()
+        for kept in KEPT:
+            for file in sorted((kernels / "gearmbs").glob(kept)):
+                shutil.move(file, along)
+        shutil.rmtree(kernels)
+        for made in sorted(root.rglob("__pycache__"), reverse=True):
+            shutil.rmtree(made)
+        _run(sys.executable, "-m", "wheel", "pack", "--dest-dir", place, str(root))
+        (packed,) = Path(place).glob("*.whl")
+        version = f"cp{sys.version_info.major}{sys.version_info.minor}"
+        tags = ("--python-tag", version, "--abi-tag", version, "--platform-tag", SYSTEM)
+        name = _run(sys.executable, "-m", "wheel", "tags", "--remove", *tags, str(packed)).strip().splitlines()[-1]
+        folder.mkdir(parents=True, exist_ok=True)
+        return Path(shutil.move(packed.with_name(Path(name).name), folder / Path(name).name))
+
+
+def _compile(root: Path, kernels: Path, modules: list[str] | None) -> None:
+    """Compile the kernels of a package that lies in some folder, for the common processor."""
+    name, features = cache.COMMON
+    own = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "GEARMBS_"))}
+    own |= {"NUMBA_CPU_NAME": name, "NUMBA_CPU_FEATURES": features, "NUMBA_CACHE_DIR": str(kernels)}
+    own |= {"PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+    code = f"from gearmbs.kernels.ahead import compile_all; compile_all(print, {modules!r})"
+    _run(sys.executable, "-P", "-c", code, environment=own, folder=root)
+
+
+def _run(*command: str, environment: dict[str, str] | None = None, folder: Path | None = None) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=folder)
+    if done.returncode:
+        raise ShippingError(f"{' '.join(command[1:4])} failed:\n{done.stderr.strip()[-2000:]}")
+    return done.stdout
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line of this module."""
+    parser = argparse.ArgumentParser(
+        prog="python -m gearmbs.kernels.ship", description="Put compiled kernels into a wheel."
+    )
+    parser.add_argument("wheel", type=Path, help="a wheel of gearmbs for all systems")
+    parser.add_argument("--out", type=Path, default=Path("dist"), help="folder of the new wheel; default: dist")
+    given = parser.parse_args(arguments)
+    try:
+        made = ship(given.wheel, given.out)
+    except ShippingError as error:
+        sys.exit(str(error))
+    print(f"{made}: {made.stat().st_size / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()
