@@ -17,8 +17,8 @@ from pathlib import Path
 
 from gearmbs.kernels import cache
 
-KEPT = ("*.entry", "*.part")
-"""Machine code, and the LLVM code that kernels of a user's own are linked with."""
+KEPT = ("*.entry", "*.part", "*.object_x86_64_v3")
+"""Machine code, the LLVM code that kernels of a user's own are linked with, and what exported models are linked of."""
 
 SYSTEM = "manylinux_2_28_x86_64"
 """Kernels call functions of the C library's mathematics, and of numba: its wheels ask for this much, so no less."""
@@ -28,7 +28,7 @@ class ShippingError(RuntimeError):
     """A wheel that kernels cannot be put into."""
 
 
-def ship(wheel: Path, folder: Path, modules: list[str] | None = None) -> Path:
+def ship(wheel: Path, folder: Path, modules: list[str] | None = None, kernels: Path | None = None) -> Path:
     """Write a wheel with compiled kernels beside one without; return its path.
 
     Parameters
@@ -39,6 +39,9 @@ def ship(wheel: Path, folder: Path, modules: list[str] | None = None) -> Path:
         Where the new one is written.
     modules : list of str, optional
         Compile what these modules need; by default, all of the package.
+    kernels : Path, optional
+        A ``NUMBA_CACHE_DIR`` for the same processor: what lies there is shipped, too, as kernels that are first compiled
+        by a call with some types, or by an export. By default one that begins empty.
 
     Raises
     ------
@@ -53,15 +56,14 @@ def ship(wheel: Path, folder: Path, modules: list[str] | None = None) -> Path:
         raise ShippingError(f"wheel is {str(wheel)!r}; give one that pip wheel has made")
     with tempfile.TemporaryDirectory() as place:
         _run(sys.executable, "-m", "wheel", "unpack", "--dest", place, str(wheel))
-        (root,) = Path(place).iterdir()
-        kernels = root / "kernels-of-this-wheel"
-        _compile(root, kernels, modules)
+        (root,) = Path(place).glob("gearmbs-*")
+        kept_in = (kernels or Path(place, "kernels")).absolute()
+        _compile(root, kept_in, modules)
         along = root / "gearmbs" / "kernels" / cache.SHIPPED.name
         along.mkdir()
         for kept in KEPT:
-            for file in sorted((kernels / "gearmbs").glob(kept)):
-                shutil.move(file, along)
-        shutil.rmtree(kernels)
+            for file in sorted((kept_in / "gearmbs").glob(kept)):
+                shutil.copy(file, along)
         for made in sorted(root.rglob("__pycache__"), reverse=True):
             shutil.rmtree(made)
         _run(sys.executable, "-m", "wheel", "pack", "--dest-dir", place, str(root))
@@ -97,9 +99,10 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("wheel", type=Path, help="a wheel of gearmbs for all systems")
     parser.add_argument("--out", type=Path, default=Path("dist"), help="folder of the new wheel; default: dist")
+    parser.add_argument("--kernels", type=Path, help="a NUMBA_CACHE_DIR, made for the same processor, to ship as well")
     given = parser.parse_args(arguments)
     try:
-        made = ship(given.wheel, given.out)
+        made = ship(given.wheel, given.out, kernels=given.kernels)
     except ShippingError as error:
         sys.exit(str(error))
     print(f"{made}: {made.stat().st_size / 1e6:.1f} MB")
