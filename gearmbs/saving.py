@@ -15,6 +15,8 @@ from gearmbs.wording import any_of
 
 WRITERS: dict[str, dict[str, str]] = {
     "Case": {".toml": "gearmbs.studies.case.texts:write_case"},
+    "Drivetrain": {".toml": "gearmbs.studies.train_files:write_train"},
+    "Description": {".toml": "gearmbs.studies.train_files:write_train"},
     "GearSpec": {
         ".dxf": "gearmbs.view:write_dxf",
         ".step": "gearmbs.view:write_step",
@@ -47,11 +49,11 @@ def save(thing: Any, path: str | Path) -> Path | list[Path]:
     Parameters
     ----------
     thing : object
-        A case (``.toml``), a wheel or pair (``.dxf``, ``.step``, ``.stl``), a mechanism (``.adm``), a solution or data
-        set (``.nc``), a signal (any format of `gearmbs.write_signal`), a figure (``.png``, ``.svg``, ``.pdf``), a table
-        (``.csv``), a report (``.md``, ``.html`` with its figure, ``.json`` with all tables, ``.csv`` for one file a
-        table: ``worn.csv`` gives ``worn_levels.csv`` and others), or anything with a ``save`` of its own, such
-        as scenes, animations and studies.
+        A case or a drivetrain (``.toml``), a wheel or pair (``.dxf``, ``.step``, ``.stl``), a mechanism (``.adm``), a
+        solution or data set (``.nc``), a signal (any format of `gearmbs.write_signal`), a figure (``.png``, ``.svg``,
+        ``.pdf``), a table (``.csv``), a report (``.md``, ``.html`` with its figure, ``.json`` with all tables, ``.csv``
+        for one file a table: ``worn.csv`` gives ``worn_levels.csv`` and others), or anything with a ``save`` of its
+        own, such as scenes, animations and studies.
     path : path
         Folders are made.
 

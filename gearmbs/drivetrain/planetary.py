@@ -237,7 +237,7 @@ def planetary_set(
         one = dict(one)
         where = str(one.pop("at", ""))
         places.append((where, fault(one)))
-    return planetary(faults=places, **table)
+    return planetary(faults=tuple(places), **table)
 
 
 SET_KEYS = (
