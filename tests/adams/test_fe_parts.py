@@ -51,6 +51,7 @@ def tip(rest, script="SIMULATE/STATICS\n", **given):
 
 
 @pytest.mark.parametrize(("component", "moment"), [("FY", IZZ), ("FZ", IYY)])
+@pytest.mark.slow
 def test_a_small_force_bends_it_by_its_own_moment(component, moment):
     """F L^3 / 3 E I and the shear F L / G A: IYY is about y, so that a force along z bends by it."""
     found = tip(f"GFORCE/1,I=11,JFLOAT=1,RM=1,{component}=1")

@@ -247,6 +247,7 @@ def test_a_late_wish_is_said():
         run(PULLED.format("USER(1)"), {"sfosub": late})
 
 
+@pytest.mark.slow
 def test_routines_from_a_file_on_the_command_line(tmp_path):
     (tmp_path / "m.adm").write_text(DECK.format(force=PULLED.format("USER(0.3, 0.01, 2)")))
     (tmp_path / "own.py").write_text(

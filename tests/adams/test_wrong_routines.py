@@ -120,6 +120,7 @@ REQUEST/1, F2=AZ(21,12)\\F3=WZ(21,12,12)\\F4=WDTZ(21,12,12)\\F6=MOTION(1,0,8,12)
 
 
 @pytest.mark.parametrize(("level", "atol"), [("", 1e-4), ("VELOCITY, ", 1e-5), ("ACCELERATION, ", 1e-9)])
+@pytest.mark.slow
 def test_motions_by_rates_from_routines(level, atol):
     """Displacement, rate, change and torque are those of the written function; differences are made of the rest."""
     text = "MOTION/1, JOINT=1, " + level + "FUNCTION={}"

@@ -117,6 +117,7 @@ def nested(x: float, law: dict, table: list) -> float:
     return x * law["stiffness"] + sum(table)
 
 
+@pytest.mark.slow
 def test_functions_of_more_than_numbers(tmp_path):
     parameters = {"x": 1.0, "law": {"stiffness": "2 N/mm", "kind": "soft"}, "table": np.arange(3)}
     subject = FunctionSubject(nested, parameters, units={"law.stiffness": "N/m"})

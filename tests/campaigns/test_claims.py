@@ -80,6 +80,7 @@ def test_given_data_of_a_few_values_do_not_hang_on_their_order():
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.9])
+@pytest.mark.slow
 def test_given_data_are_right_on_average(share):
     """Of independent results over as many values as bins, five of each."""
     generator = np.random.default_rng(1)

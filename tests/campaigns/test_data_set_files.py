@@ -44,6 +44,7 @@ def contents(folder):
     return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
+@pytest.mark.slow
 def test_no_flipped_bit_is_read(copied):
     """Of 150 single bits 126 gave other numbers without a word."""
     whole = read_data_set(copied)

@@ -463,6 +463,7 @@ def test_gearboxes_of_one_file_have_their_own_names_and_the_same_individuals():
     assert _individuals(SimpleNamespace(plan=two)) != one[1]
 
 
+@pytest.mark.slow
 def test_gearboxes_of_a_data_set_share_no_noise_and_no_drift(tmp_path):
     """Campaigns under one name, whose records of one number are of one state: noise they shared would tell."""
     both = [ringing(tmp_path / name, torque) for name, torque in (("a", 20.0), ("b", 21.0))]

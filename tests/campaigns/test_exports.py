@@ -46,6 +46,7 @@ def test_places_that_will_not_do_are_told(campaign, tmp_path, form):
     assert all(path.is_file() for path in written)
 
 
+@pytest.mark.slow
 def test_reports_and_pages_that_have_no_place(campaign, tmp_path):
     with pytest.raises(CampaignError, match=says("folder", "c.html")):
         campaign.report(tmp_path)
@@ -139,6 +140,7 @@ def having(state) -> dict[str, float]:
     return {"y": 0.0 if state == "sound" else float(state["size"])}
 
 
+@pytest.mark.slow
 def test_a_state_without_size_is_not_held_out(tmp_path):
     """Its severity is 0 in the table, and it has none: a range of small ones takes the small ones of the others."""
     campaign = states(tmp_path / "c")

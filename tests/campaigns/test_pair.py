@@ -236,6 +236,7 @@ def test_files_that_changed_after_cases_were_done_are_refused(tmp_path):
 OWN = "from stiffness import K\n\n\ndef sfosub(call):\n    return -K * (call.sysfnc('DM', 2, 1) - 0.5)\n"
 
 
+@pytest.mark.slow
 def test_routines_that_are_edited_under_a_run_are_refused(tmp_path, monkeypatch):
     """What they import counts as they do: a unit during which it was edited is none, one before and one after are."""
     (tmp_path / "own.py").write_text(OWN)

@@ -328,6 +328,7 @@ def test_a_sum_that_explains_little_says_so():
         fit_chaos(points, points @ [1.0, 2.0, 3.0], NAMES)
 
 
+@pytest.mark.slow
 def test_one_factor_studies(tmp_path):
     factors = [Factor(name, -1.0, 1.0, levels=5) for name in ("x1", "x2")]
     campaign = Campaign(tmp_path / "c", make_plan(function(), factors, "one at a time", unit=16))
@@ -433,6 +434,7 @@ def named(x: float) -> dict[str, float]:
     return {"a.b": x, "a_b": 2.0 * x, f"{long}.1": 3.0 * x, f"{long}.2": 4.0 * x, "weg_ä": 5.0 * x}
 
 
+@pytest.mark.slow
 def test_columns_that_matlab_would_name_alike_are_told_apart(tmp_path):
     subject = FunctionSubject(named, {"x": 0.0})
     campaign = Campaign(tmp_path / "c", make_plan(subject, [Factor("x", 1.0, 2.0)], n=2))
@@ -488,6 +490,7 @@ def test_screening_designs_name_what_their_effects_hold(count):
     assert "aliases" not in plain
 
 
+@pytest.mark.slow
 def test_a_fraction_has_a_report(tmp_path):
     factors = [Factor(name, -1.0, 1.0) for name in PLACES]
     campaign = Campaign(tmp_path / "c", make_plan(function(), factors, "factorial", options={"generators": ["C=AB"]}))
@@ -496,6 +499,7 @@ def test_a_fraction_has_a_report(tmp_path):
 
 
 @pytest.mark.parametrize("design", ["sobol", "grid"])
+@pytest.mark.slow
 def test_a_surface_of_a_few_values_goes_by_them(tmp_path, design):
     """Of two alternatives the second is 1; three have no order, and are refused."""
     subject = FunctionSubject(adding, {"a": 1.0, "b": 2.0})
@@ -528,6 +532,7 @@ def test_a_surface_of_whole_numbers_goes_by_their_values(tmp_path):
     np.testing.assert_allclose(surface.coefficients, [3.0 + 3.5 + 2.0, 2.5, 1.0])
 
 
+@pytest.mark.slow
 def test_points_that_constraints_leave_are_fitted_in_the_unit_cube(tmp_path):
     """As the messages say; columns in SI, of which the indices would be of other ranges, are refused."""
     factors = [Factor("a", 1.0, 5.0), Factor("b", 100.0, 300.0)]

@@ -210,6 +210,7 @@ def test_damage_is_found_and_mended(tmp_path, undisturbed):
     assert digest(campaign) == undisturbed
 
 
+@pytest.mark.slow
 def test_failed_cases_may_be_tried_again(tmp_path):
     campaign = moody(tmp_path, fails=1)
     campaign.run(workers=0)

@@ -219,6 +219,7 @@ def test_groups_that_are_none(groups):
     assert set(split_by_group(list("aabbccdd"))) == {"train", "test", "validation"}
 
 
+@pytest.mark.slow
 def test_what_is_made_of_a_part_says_so(tmp_path):
     campaign = small(tmp_path / "c")
     campaign.work(1, 2)
@@ -276,6 +277,7 @@ def test_results_that_are_no_numbers_are_left_out_of_maps_and_figures(tmp_path):
         assert condition_map(campaign, "x1 > 0 or x2 > 9", "x1", "x2", 2)[1].sum() == 40
 
 
+@pytest.mark.slow
 def test_a_report_of_a_part_says_so_once(tmp_path):
     """The cases that are not done, and those that failed; a whole one has nothing to say."""
     campaign = small(tmp_path / "c", "picky")
@@ -296,6 +298,7 @@ def test_a_report_of_a_part_says_so_once(tmp_path):
         assert "of 40 cases;" not in whole.report(tmp_path / "s.html", "y").read_text()
 
 
+@pytest.mark.slow
 def test_one_run_at_the_centre_has_no_error_left_out(tmp_path):
     """It alone decides the constant; of three each is told by the others."""
     for centre, options in ((1, {}), (3, {"options": {"centre": 3}})):

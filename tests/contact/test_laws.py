@@ -81,6 +81,7 @@ def pressure(law: ContactLaw, depth: float, rate: float, share: float = 1.0, dam
     return normal_law(code, share * law.stiffness, law.exponent, c, law.depth, depth, rate)[0]
 
 
+@pytest.mark.slow
 def test_no_other_place_asks_for_the_kind_of_a_law():
     """What is known of a kind is in its row: a comparison elsewhere leaves out a kind that is added later."""
     texts = {p.relative_to(PACKAGE).as_posix(): p.read_text(encoding="utf-8") for p in PACKAGE.rglob("*.py")}

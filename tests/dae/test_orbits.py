@@ -48,6 +48,7 @@ def compared(motion, force, slope, damping):
     return np.abs(start - found).max(), np.abs(np.sort_complex(motion.multipliers) - np.sort_complex(wanted)).max()
 
 
+@pytest.mark.slow
 def test_a_duffing_oscillator_is_that_of_an_independent_shooting():
     motion = steady_motion(oscillator("0.3*COS(1.2*TIME)-0.1*VX(I,J)-DX(I,J)-DX(I,J)**3"), TAU / 1.2, tol=1e-9)
     off = compared(motion, lambda t, x, v: 0.3 * np.cos(1.2 * t) - 0.1 * v - x - x**3, lambda x: -1 - 3 * x * x, 0.1)
@@ -55,6 +56,7 @@ def test_a_duffing_oscillator_is_that_of_an_independent_shooting():
     assert max(off) < 1e-6, off
 
 
+@pytest.mark.slow
 def test_a_piecewise_linear_oscillator_is_that_of_an_independent_shooting():
     force = "10+30*COS(6*TIME)-0.5*VX(I,J)-40*DX(I,J)-100*MAX(DX(I,J)-0.3,0)"
     motion = steady_motion(oscillator(force), TAU / 6.0, tol=1e-9)
@@ -116,6 +118,7 @@ def test_an_orbit_that_has_doubled_its_period_is_found_with_the_doubled_one():
     assert motion.period == pytest.approx(TAU * (2 if doubled else 1))
 
 
+@pytest.mark.slow
 def test_a_chaotic_motion_has_no_orbit_that_it_goes_to():
     # Ueda: x'' + 0.05 x' + x^3 = 7.5 cos t
     with pytest.raises(NoOrbit) as error:

@@ -386,6 +386,7 @@ def test_the_torsional_chain_has_the_modes_of_planets_on_ideal_pins():
     assert t[-1] == pytest.approx(2e-3)
 
 
+@pytest.mark.slow
 def test_a_carrier_on_a_shaft_that_bends_becomes_that_on_a_rigid_one():
     bearings = [ElasticBearing(name=n, shaft="out", station=z, stiffness=(2e8, 2e8, 1e8))
                 for n, z in (("c", "10 mm"), ("d", "90 mm"))]  # fmt: skip
@@ -661,11 +662,13 @@ def test_a_ring_in_a_housing_of_finite_elements_pushes_on_its_mounts():
     assert near[0] > 10 * near[1]
 
 
+@pytest.mark.slow
 def test_a_ring_without_nodes_of_its_housing_is_refused():
     with pytest.raises(DrivetrainError, match=says("'set ring'", "'case'", "nodes")):
         _ = in_walls(seats={"set ring": ("1 mm", "1 mm")}).modal_models
 
 
+@pytest.mark.slow
 def test_a_ring_may_be_on_a_rigid_housing_and_a_carrier_not_on_finite_elements():
     train = alone(on="case", housings=[case()])
     assert train.build().elements["set planet 1-ring"].j.body.name == "case"

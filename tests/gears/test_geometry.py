@@ -212,6 +212,7 @@ def test_senses_of_rotation_and_frictions_are_taken():
 
 @settings(max_examples=60, derandomize=True, deadline=None)
 @given(b1=st.integers(5, 60), b2=st.integers(5, 60), shift=st.floats(-80, 80))
+@pytest.mark.slow
 def test_common_face_width_is_the_overlap_of_both_faces(b1, b2, shift):
     """In mm, counted by the ends of both faces, whichever is the wider and the driver."""
     one, two = (GearSpec(29, "3 mm", face_width=b * 1e-3) for b in (b1, b2))

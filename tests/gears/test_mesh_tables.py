@@ -47,6 +47,7 @@ def test_the_table_of_forces_is_the_inverse_of_the_transmission_error(internal, 
     np.testing.assert_allclose(-table.force[:, 0].mean(), table.force[:, -1].mean(), rtol=0.02)
 
 
+@pytest.mark.slow
 def test_faults_are_in_tables_of_a_whole_turn():
     """A tooth out of place carries first when it comes, and the next ones as before."""
     sound = pair()
@@ -61,6 +62,7 @@ def test_faults_are_in_tables_of_a_whole_turn():
 
 
 @pytest.mark.parametrize("amount", ["-10 um", "10 um", "40 um"])
+@pytest.mark.slow
 def test_teeth_out_of_place_touch_within_the_backlash(amount):
     """A tooth that stands forward, or back on the other flanks, carries where sound ones have room: as the kernel says,
     at lags that are none of the table. A sound pair has nothing there."""
@@ -159,6 +161,7 @@ def test_names_are_those_of_programs(tmp_path):
         assert table.to_modelica(tmp_path, "stage_1").exists()
 
 
+@pytest.mark.slow
 def test_from_the_command_line(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(
@@ -176,6 +179,7 @@ def test_from_the_command_line(tmp_path):
     assert re.search(says("--torques", "csv", "modelica"), " ".join(result.output.split()))
 
 
+@pytest.mark.slow
 def test_planetary_sets_have_tables_of_both_meshes(tmp_path):
     file = tmp_path / "set.toml"
     file.write_text(

@@ -115,6 +115,7 @@ def magnets(**options) -> Mechanism:
 @pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
 @pytest.mark.parametrize("formulation", ["SI2", "SI1", "I3"])
 @pytest.mark.parametrize("derivatives", [None, exact_magnet])
+@pytest.mark.slow
 def test_magnet_keeps_to_keplers_orbit(formulation, integrator, derivatives):
     """x'' = -(c/m) x/|x|^3, energy m v^2/2 - c/r."""
     solution = magnets(derivatives=derivatives).simulate(

@@ -195,6 +195,7 @@ def crank(angle: float, backwards: bool) -> gm.Mechanism:
 
 @pytest.mark.filterwarnings("ignore:.*balance")
 @pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.slow
 def test_a_slider_crank_has_one_coordinate_over_a_turn(backwards):
     """A is a continuous function of the crank's angle, d/d phi of phi'', through dead centres and upright positions."""
     for angle in np.linspace(0.05, 2.0 * np.pi + 0.05, 16):

@@ -427,6 +427,7 @@ def test_an_angle_that_was_led_stays_where_a_state_was_taken():
 
 
 @pytest.mark.parametrize("lump", [False, True])
+@pytest.mark.slow
 def test_what_is_set_acts_from_the_next_advance_on(lump):
     """Until then an input tells what is going to act, all else what has: at the start as in a model made so."""
 

@@ -96,6 +96,7 @@ def test_points_are_outputs_of_one_run(model, options):
 
 @pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF"])
 @pytest.mark.parametrize("model", [slider_crank, top])
+@pytest.mark.slow
 def test_continuations_are_exact(model, integrator, tmp_path):
     """In the same simulator, in another one, from a file, and in a run: the same states, bit for bit."""
     times = np.linspace(0.0, 1.0, 47)
@@ -154,6 +155,7 @@ def test_branches_from_states_of_one_run(model, records):
     np.testing.assert_array_equal(other.state().y, passed[19])
 
 
+@pytest.mark.slow
 def test_a_state_brings_no_tolerance_and_no_order():
     """A run that goes on from a loose one has its own tolerance and largest order, as one that began with them."""
     state = advanced(slider_crank(), (0.0, 0.3), tol=1e-4).state()
@@ -171,6 +173,7 @@ def test_a_state_brings_no_tolerance_and_no_order():
 
 
 @pytest.mark.parametrize("at", [0.15, 0.2, 0.25, 0.3, 0.35])
+@pytest.mark.slow
 def test_a_state_of_a_loose_run_is_gone_on_from_afresh_by_tight_ones(at, tmp_path):
     """What it remembers is off from one point to the next by its own tolerance; as tight a run goes on with that."""
     state = advanced(slider_crank(), (0.0, at), tol=1e-4).state()
@@ -219,6 +222,7 @@ def test_a_state_of_a_loose_run_is_moved_onto_the_constraints(model, joint):
     np.testing.assert_array_equal(sim.solution().result.y[-1], runs[1].result.y[-1])
 
 
+@pytest.mark.slow
 def test_states_of_a_loose_run_go_on_from_any_time():
     """Also where they are off by a few tolerances only, which no step of any size would accept."""
     m = slider_crank()
@@ -275,6 +279,7 @@ def test_a_history_goes_with_its_equations_only(tmp_path):
             assert other.get("angular_velocity", "disc")[2] == pytest.approx(0.5 + 0.5 * torque, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_functions_of_python_are_the_same_only_if_they_are_one(tmp_path):
     """The same text with another function is another model, also where the first one is gone."""
 
@@ -302,6 +307,7 @@ def test_functions_of_python_are_the_same_only_if_they_are_one(tmp_path):
         assert other.get("joint_angle", "pin") == pytest.approx(-0.5, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_the_page_on_steps_says_what_comes_out(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     page = (Path(__file__).parents[2] / "docs" / "howto" / "stepping.md").read_text()
@@ -336,6 +342,7 @@ def test_pair_of_the_paper():
         assert_all_names_agree(m, sim, one)
 
 
+@pytest.mark.slow
 def test_values_are_those_of_the_solution():
     times = np.linspace(0.0, 1.0, 31)
     one = slider_crank().simulate(1.0, t_eval=times)
@@ -354,6 +361,7 @@ def test_values_are_those_of_the_solution():
     assert sim.real_time_factor > 0.0
 
 
+@pytest.mark.slow
 def test_states_of_a_solution(tmp_path):
     """They start a run afresh, with the turns counted until then."""
     times = np.linspace(0.0, 1.0, 1001)
@@ -373,6 +381,7 @@ def test_states_of_a_solution(tmp_path):
     np.testing.assert_allclose(last.load("coil")[1][-1], one.load("coil")[1][-1], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_is_refused(tmp_path):
     sim = gm.Simulator(slider_crank(), 1.0)
     sim.advance("0.2 s")

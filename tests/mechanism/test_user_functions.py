@@ -179,6 +179,7 @@ def test_functions_are_asked_where_the_motion_is_only(lump):
     assert len(solution.reaction("pin_free")[0]) == len(solution)
 
 
+@pytest.mark.slow
 def test_the_integral_of_a_function_of_time():
     """Beside one of positions, of which it does not ask; its derivatives are the function and its rate."""
     m = Mechanism("integral")

@@ -147,6 +147,7 @@ def test_looseness_near_a_shifted_cage_is_none():
     assert not [finding for finding in report.findings if finding.grade == "shifted"]
 
 
+@pytest.mark.slow
 def test_a_sound_record_is_acquitted_within_the_tolerance_unless_its_speed_is_found():
     sound = diagnose_bearing(record(), "6205", rpm(0.0), shafts=())
     assert "this holds for speeds of 1731.3 to 1748.7 rpm" in sound.verdict
@@ -156,6 +157,7 @@ def test_a_sound_record_is_acquitted_within_the_tolerance_unless_its_speed_is_fo
     assert not any("this holds for" in report.verdict for report in (turning_too, exact))
 
 
+@pytest.mark.slow
 def test_a_clear_part_stays_named_beside_another_machines_shaft():
     other = turning(1.03 * SHAFT)
     report = diagnose_bearing(record(pulses(LINES.bpfo * SHAFT), other), "6205", rpm(0.0), shafts=())
@@ -268,6 +270,7 @@ def test_a_speed_that_was_found_is_judged_at_what_it_may_be_off():
     assert [answer.speed.told for answer in answers] == pytest.approx([1.002 * SHAFT, SHAFT, 0.99 * SHAFT])
 
 
+@pytest.mark.slow
 def test_quiet_lines_accuse_nothing_unless_asked_to():
     loud = record(pulses(LINES.bpfo * SHAFT, jitter=0.0), noise=1e-4)
     quiet = loud.copy(data=1e-3 * loud.values)
@@ -302,6 +305,7 @@ def test_says_what_is_wrong_with_margins(settings, words):
         diagnose_bearing(record(), "6205", rpm(0.0), **settings)
 
 
+@pytest.mark.slow
 def test_faint_lines_of_several_records_add_up():
     reports = {
         f"load {k}": diagnose_bearing(
@@ -317,6 +321,7 @@ def test_faint_lines_of_several_records_add_up():
     assert "load 3" in together.to_markdown()
 
 
+@pytest.mark.slow
 def test_records_of_noise_name_nothing_together_and_bearings_must_be_the_same():
     noise = [diagnose_bearing(record(seed=k), "6205", rpm(0.0)) for k in range(3)]
     assert combine_bearings(noise).fault is None
@@ -327,6 +332,7 @@ def test_records_of_noise_name_nothing_together_and_bearings_must_be_the_same():
         combine_bearings([noise[0], other])
 
 
+@pytest.mark.slow
 def test_a_record_is_one_witness():
     first, second = (diagnose_bearing(record(seed=k), "6205", rpm(0.0)) for k in range(2))
     with pytest.raises(SignalError, match=says("record 1", "record 3", "one witness")):
@@ -369,6 +375,7 @@ def test_a_simulated_bearing_without_noise(defect, part):
         assert named == {part}
 
 
+@pytest.mark.slow
 def test_an_acquittal_says_what_limits_it():
     """Of few turns, of tops cut off; whole records say neither."""
     knocks, sound = record(pulses(LINES.bpfo * SHAFT), RUNNING), record(RUNNING)

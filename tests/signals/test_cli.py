@@ -229,6 +229,7 @@ def lines_of_shaft(turns, orders, level=0.3, more=None):
     (0.004, range(1, 13), "from a family of its orders"),
     (0.03, range(1, 13), "from a family of its orders"),
 ])  # fmt: skip
+@pytest.mark.slow
 def test_bearings_and_vibration_are_reported_at_one_speed(tmp_path, off, orders, told):
     """A single line says where orders are taken, and is called no speed; a family far off is that of both reports."""
     write_signal(lines_of_shaft(1745.0 / 60.0 * (1.0 + off), orders), tmp_path / "x.csv")
@@ -248,6 +249,7 @@ def test_bearings_and_vibration_are_reported_at_one_speed(tmp_path, off, orders,
         assert bearings == pytest.approx(vibration, abs=0.5)
 
 
+@pytest.mark.slow
 def test_bearings_take_the_speed_of_the_mesh_line_where_no_family_tells_it(tmp_path):
     signal = lines_of_shaft(29.3, (), more=lambda t: np.cos(2 * np.pi * 29.3 * 32 * t))
     write_signal(signal, tmp_path / "x.csv")

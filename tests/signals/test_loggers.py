@@ -68,6 +68,7 @@ def test_mdf_is_told_by_content_and_channels_are_chosen(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.slow
 def test_an_mdf_file_that_is_cut_short_is_named(tmp_path):
     path = logged(tmp_path / "log.mf4")
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])

@@ -116,6 +116,7 @@ def test_a_few_drop_outs_to_the_range_are_told_unless_they_are_bridged():
 
 
 @pytest.mark.parametrize("known", [{}, {"quantity": "acceleration", "band": ("100 Hz", "5 kHz")}])
+@pytest.mark.slow
 def test_a_comparison_says_loudly_that_drop_outs_were_left(known):
     sound = {state: add_noise(vibration(seconds=1.0), seed=k, rms=1e-5) for k, state in enumerate(("healthy", "worn"))}
     bad = {state: drop_outs(one, per_second=20, full_scale=0.2, seed=7) for state, one in sound.items()}

@@ -132,6 +132,7 @@ def test_a_speed_column_or_tacho_that_the_mesh_line_contradicts_is_remarked(off,
 
 @pytest.mark.parametrize("sidebands", [0.0, 0.3])
 @pytest.mark.parametrize("second", [0.0, 0.2])
+@pytest.mark.slow
 def test_half_the_speed_is_remarked_where_it_scores_nearly_as_well(sidebands, second):
     """400 Hz and its second harmonic are every second line of 200 Hz; lines at 200 and 600 Hz make that right."""
     t = np.arange(4 * 12800) / 12800
@@ -147,6 +148,7 @@ def test_half_the_speed_is_remarked_where_it_scores_nearly_as_well(sidebands, se
     assert checks(analyse(x, 20, rate=12800, speed="600 rpm")) == []
 
 
+@pytest.mark.slow
 def test_rates_and_speeds_that_no_machine_has_are_remarked():
     said = checks(analyse(pair(), 32, rate=10 * RATE))
     assert any("15000" in note and "sampling rate" in note for note in said)

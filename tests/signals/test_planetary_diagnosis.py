@@ -97,6 +97,7 @@ def test_pulses_at_the_kinematic_orders(part):
 
 
 @pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 20), marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_sound_records_are_not_accused(seeds):
     for seed in seeds:
         for noise in (1e-3, 0.05, 0.5):

@@ -55,6 +55,7 @@ def test_texts_keep_all_digits_in_the_legacy_print_mode(tmp_path):
 @pytest.mark.parametrize(
     "format", [pytest.param(name, marks=pytest.mark.slow) if name == "csv.gz" else name for name in NAMES]
 )
+@pytest.mark.slow
 def test_sections_put_together_are_the_record(tmp_path, format):
     whole = record()
     path = write_signal(whole, tmp_path / NAMES[format], format=format)

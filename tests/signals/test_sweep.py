@@ -39,6 +39,7 @@ def test_steady_lines_do_not_move(rpm, seed):
 
 
 @pytest.mark.parametrize("teeth", [None, 29])
+@pytest.mark.slow
 def test_a_run_up_with_one_speed_is_told(teeth):
     said = analyse(record(1500 + 300 * PART), teeth, speed="1650 rpm").notes
     assert any(note.startswith("CHECK THE SPEED: lines of the record move up") for note in said)
@@ -66,6 +67,7 @@ def test_a_run_up_whose_mesh_is_elsewhere_is_told(share):
     assert (report.harmonics["orders"].values[0, 0] > 0.69) == (share == 1.0)
 
 
+@pytest.mark.slow
 def test_a_run_up_with_one_speed_acquits_no_bearing():
     doubted = diagnose_bearing(record(900 + 1500 * PART), "6205", "1650 rpm")
     assert doubted.verdict.startswith("No part of bearing 6205 is named for certain")
@@ -76,6 +78,7 @@ def test_a_run_up_with_one_speed_acquits_no_bearing():
 
 @pytest.mark.parametrize("teeth", [None, 29])
 @pytest.mark.parametrize(("told", "true"), [(44100.0, "48000 Hz"), (51200.0, "48000 Hz"), (48000.0, None)])
+@pytest.mark.slow
 def test_mixed_up_rates_are_told_by_a_told_speed(told, true, teeth):
     steady = record(1650.0)
     shaft = sum(0.2 * np.cos(2 * np.pi * 27.5 * k * RATE * SECONDS * PART / RATE + k) for k in (1, 3, 4, 5))

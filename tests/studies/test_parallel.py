@@ -185,6 +185,7 @@ def test_a_job_at_work_gives_signs_of_life_without_a_report(tmp_path, monkeypatc
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals to process groups are POSIX")
 @pytest.mark.parametrize("everyone", [True, False], ids=["from the terminal", "to the parent"])
+@pytest.mark.slow
 def test_ctrl_c_ends_all_processes(everyone):
     """Both workers wait for ever. Ctrl-C in a terminal reaches all processes of the group, kill only the parent."""
     # a job in the background starts with the signal ignored

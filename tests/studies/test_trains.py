@@ -101,6 +101,7 @@ def test_harmonics_of_the_mesh(train, record):
     assert float(levels.sel(signal="force of mesh", harmonic=1)) == pytest.approx(line, rel=0.05)
 
 
+@pytest.mark.slow
 def test_signals_go_on_to_the_analysis(tmp_path, record):
     one = train_signal(record, "seat")
     assert one.attrs["teeth"] == (20, 60)
@@ -214,6 +215,7 @@ def test_records_that_cannot_be_are_refused(settings, words):
 
 
 @pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
+@pytest.mark.slow
 def test_trains_side_by_side_have_the_records_of_each_alone(integrator):
     """In the order of their names, with the progress of each; a failure of one stops the others."""
     run = RunSettings(duration=0.02, settling=0.0, tolerance=1e-6, integrator=integrator)
@@ -284,6 +286,7 @@ def test_a_motor_with_slip_has_its_lines_at_its_own_speed():
     )
 
 
+@pytest.mark.slow
 def test_signals_of_a_run_up_have_its_speed_over_time(tmp_path, train, record):
     """Their orders are those of the record's own tracks; from a file it is the same. A steady record has one speed."""
     drive = SpeedDrive(name="motor", shaft="in", speed="1500 rpm", curve=[["20 ms", "500 rpm"], ["0.3 s", "1500 rpm"]])

@@ -33,6 +33,7 @@ def signal():
         (order_track_plot, {"orders": [10], "over": "time", "log": True}, ("time, s", "peak amplitude, m/s²")),
     ],
 )
+@pytest.mark.slow
 def test_a_signal_is_drawn_with_labels(signal, draw, settings, labels):
     figure = draw(signal, channel="b", title="run-up", **settings)
     panel = figure.axes[0]

@@ -253,6 +253,7 @@ def test_step_of_a_pair_and_of_faults(tmp_path):
         write_step(pair.with_faults(BrokenTooth()), tmp_path / "x.step")
 
 
+@pytest.mark.slow
 def test_step_volume_in_a_cad_kernel(wheel, tmp_path):
     check_volume(wheel, tmp_path)
 

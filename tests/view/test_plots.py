@@ -282,6 +282,7 @@ def test_long_names_of_curves_stay_in_the_figure(pair):
     assert_readable(transmission_error_plot(names))
 
 
+@pytest.mark.slow
 def test_load_sharing_and_contact_pattern(pair):
     tilted = pair.with_changes(misalignment=np.deg2rad(1.0))
     patterns = {n: contact_pattern(p, points=21, sections=11) for n, p in (("healthy", pair), ("misaligned", tilted))}

@@ -69,6 +69,7 @@ def test_pac2002_gives_the_published_formula(tmp_path, state, mode):
 
 @pytest.mark.parametrize("state", STATES[1:])
 @pytest.mark.parametrize("mode", [1, 2, 3, 4])
+@pytest.mark.slow
 def test_pac89_gives_the_published_formula(tmp_path, state, mode):
     kappa, alpha, gamma, load = state
     loaded = R0 - load / KZ
@@ -87,6 +88,7 @@ CHRONO = {(0.04, 0.0): (3364.127, -61.700), (0.02, 0.03): (1816.469, -1976.176),
 """Forces along and across by slips, at 4400 N upright."""
 
 
+@pytest.mark.slow
 def test_numbers_of_another_program(tmp_path):
     """Project Chrono's ChPac02Tire, of the same coefficients; it adds 0.1 N to a divisor, which moves 2e-5 of them."""
     for (kappa, alpha), (fx, fy) in CHRONO.items():
@@ -96,6 +98,7 @@ def test_numbers_of_another_program(tmp_path):
         assert found["force_across"][-1] == pytest.approx(fy, abs=5e-5 * 4400)
 
 
+@pytest.mark.slow
 def test_relaxation_is_a_lag_over_a_length(tmp_path):
     """After a step of the slip angle the deflection comes up as 1 - exp(-x/sigma); forces end as those of rest."""
     load, alpha, kappa = 4000.0, 0.02, 0.01
@@ -115,6 +118,7 @@ def test_relaxation_is_a_lag_over_a_length(tmp_path):
 
 
 @pytest.mark.parametrize("text", [PAC2002.format(mode=4), PAC89.format(mode=2)], ids=["PAC2002", "PAC89"])
+@pytest.mark.slow
 def test_load_is_stiffness_and_damping_and_never_pulls(tmp_path, text):
     motion = driven(up="0.02*SIN(20*TIME) + 0.01")
     found, result = ran(tmp_path, text, motion, end=0.5, steps=200)
@@ -130,6 +134,7 @@ def test_load_is_stiffness_and_damping_and_never_pulls(tmp_path, text):
         assert np.abs(found[name][lifted]).max() == 0.0
 
 
+@pytest.mark.slow
 def test_a_tire_with_relaxation_leaves_the_road_and_comes_back(tmp_path):
     """Without load its relaxation lengths are zero, and nothing may be divided by them: forces are none there."""
     motion = driven(f"{SPEED}*TIME", "0.5*TIME", "0.04*SIN(20*TIME) - 0.01", "56*TIME")
@@ -148,6 +153,7 @@ def test_a_tire_with_relaxation_leaves_the_road_and_comes_back(tmp_path):
     assert found["force_across"][k] == pytest.approx(made["fy"], rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_factor_of_the_stiffness_is_one_of_the_load(tmp_path):
     load = 4000.0
     soft = PAC2002.format(mode=4).replace("LMUX = 0.95", "LMUX = 0.95\nLCZ = 0.8")
@@ -163,6 +169,7 @@ def test_a_factor_of_the_stiffness_is_one_of_the_load(tmp_path):
 
 
 @pytest.mark.parametrize("text", [PAC2002.format(mode=4), PAC89.format(mode=2)], ids=["PAC2002", "PAC89"])
+@pytest.mark.slow
 def test_a_tire_turns_into_its_way_in_either_direction(tmp_path, text):
     """What the slip angle changes of the torque about the vertical turns the wheel's plane towards its velocity."""
     for speed in (SPEED, -SPEED):
@@ -180,6 +187,7 @@ def test_a_tire_turns_into_its_way_in_either_direction(tmp_path, text):
         assert (torque[1] - torque[0]) * speed > 10.0 * abs(speed)
 
 
+@pytest.mark.slow
 def test_the_belts_mass_is_in_the_unit_of_the_file(tmp_path):
     load, alpha = 4000.0, 0.02
     motion = motion_of(0.0, alpha, 0.0, load, rolling_radius(load))
@@ -196,6 +204,7 @@ def test_the_belts_mass_is_in_the_unit_of_the_file(tmp_path):
     assert torques["kg", 5] - torques["gram", 5] == pytest.approx(0.999 * turned, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_tire_on_the_other_side_is_its_mirror_image(tmp_path):
     (tmp_path / "l").mkdir()
     (tmp_path / "r").mkdir()
@@ -229,6 +238,7 @@ def test_friction_of_the_road_scales_what_a_sliding_tire_carries(tmp_path):
 
 
 @pytest.mark.parametrize("text", [PAC2002.format(mode=4), PAC2002.format(mode=14), PAC89.format(mode=2)])
+@pytest.mark.slow
 def test_what_a_tire_does_takes_energy(tmp_path, text):
     """Sliding in any direction and at any spin, force times slip speed is a loss, shifts of the formulas aside."""
     rng = np.random.default_rng(3)
@@ -241,6 +251,7 @@ def test_what_a_tire_does_takes_energy(tmp_path, text):
         assert power < 0.0
 
 
+@pytest.mark.slow
 def test_a_locked_wheel_stands_still_and_holds(tmp_path):
     """Pushed sideways below what friction holds, a tire with relaxation is a spring and a damper, and stays there."""
     more = """\
@@ -265,6 +276,7 @@ force create body gravitational gravity_field_name = .rig.g x_component_gravity 
     assert np.abs(found["speed_across"]).max() < 0.5
 
 
+@pytest.mark.slow
 def test_a_quarter_car_against_results_of_adams(tmp_path):
     """Root mean squares that ADAMS 2024.1 gave of a step of 10 mm, published with its model.
 

@@ -65,6 +65,7 @@ def test_what_is_not_modelled_is_named(tmp_path, case):
 
 
 @pytest.mark.parametrize("case", RUNNING.values(), ids=RUNNING)
+@pytest.mark.slow
 def test_what_is_beside_it_runs(tmp_path, case):
     assert outcome(tmp_path, *case) == ""
 

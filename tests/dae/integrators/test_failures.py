@@ -141,6 +141,7 @@ def test_wrong_rates_and_multipliers_are_not_inconsistent():
 
 
 @pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.slow
 def test_nan_from_a_user_function(compiled):
     def residual(t, y, yp, out):
         out[0] = yp[0] + 1.0 + np.sqrt(y[0])

@@ -141,6 +141,7 @@ def test_pulses_at_a_steady_speed_are_no_clock(unit, tmp_path):
         read_pulses(tmp_path / "bare.csv", 64, unit="ms", clock="20 MHz")
 
 
+@pytest.mark.slow
 def test_encoders_are_taken_by_their_names(tmp_path):
     """Of three columns two have to be named; driver and driven are taken by name, whatever their order."""
     even = {name: np.arange(64 * 60) / (64.0 * speed) for name, speed in (("driven", 15.0), ("driver", 20.0))}
