@@ -40,8 +40,8 @@ def ship(wheel: Path, folder: Path, modules: list[str] | None = None, kernels: P
     modules : list of str, optional
         Compile what these modules need; by default, all of the package.
     kernels : Path, optional
-        A ``NUMBA_CACHE_DIR`` for the same processor: what lies there is shipped, too, as kernels that are first compiled
-        by a call with some types, or by an export. By default one that begins empty.
+        A ``NUMBA_CACHE_DIR`` for the same processor: what lies there is shipped, too, as kernels that a call with some
+        types or an export compiles first. By default one that begins empty.
 
     Raises
     ------
