@@ -1,7 +1,7 @@
 from .cases import CaseProblem as CaseProblem
 from .cases import compare_models as compare_models
 from .cases import identify as identify
-from .cases import rank_experiments as rank_experiments
+from .experiments import rank_experiments as rank_experiments
 from .fit import fit as fit
 from .identifiability import Identifiability as Identifiability
 from .identifiability import Surrogate as Surrogate

@@ -3,6 +3,9 @@
 The residual is (ln model - ln measured) / sigma, so that all harmonics count by their relative deviations. Sensors
 with unknown gains shift the logarithms of a channel by the same amount: such shifts are projected out, which is the fit
 of a free gain without its being a parameter of the search.
+
+Harmonics of a steady motion have derivatives without a run beside it (`gearmbs.studies.run.steady_levels`); where there
+is no such motion, or a field changes its period, they are differences.
 """
 
 from __future__ import annotations
@@ -10,41 +13,41 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
-from gearmbs.identify.fit import SIMULATION_STEP, FitKeywords, central, fit, noise_of_columns
-from gearmbs.identify.identifiability import LIMIT, Identifiability
-from gearmbs.identify.parameters import Fit, Free, IdentifyError, Scale
-from gearmbs.progress import staged
-from gearmbs.units import to_si
+from gearmbs.identify.fit import SIMULATION_STEP, FitKeywords
+from gearmbs.identify.parameters import Fit, Free, IdentifyError
+from gearmbs.identify.problem import COARSER, Gains, LevelProblem
+from gearmbs.identify.stored import Stored
+from gearmbs.identify.tables import check_table, field_of, in_si
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from gearmbs.studies import Case
+    from gearmbs.studies.run.steady_levels import SteadyLevels
 
 TOLERANCE = 1e-8
 """Tolerance of the integrator, so that differences over a step of 1e-2 are right to a few percent."""
 
-COLUMNS = ("case", "channel", "harmonic", "value", "sigma")
-"""Columns of a table of harmonics: which case, channel or component, harmonic, RMS, relative standard deviation."""
 WAYS = ("band", "orders")
 """How levels are taken."""
 
-Gains = Literal["none", "one", "channel", "case", "line"]
+DERIVATIVES = ("steady", "differences")
+"""Where derivatives come from."""
 
-EXPERIMENTS: dict[str, dict[str, Any]] = {
-    "speed x 1.5": {"operation.speed": 1.5},
-    "speed x 0.5": {"operation.speed": 0.5},
-    "torque x 2": {"operation.torque": 2.0},
-    "misaligned by 0.5 deg": {"fault.misalignment": "0.5 deg"},
-    "centre distance + 0.3 mm": {"fault.centre_distance_error": "0.3 mm"},
-}
-"""What most benches can do: by field a factor for speed and torque, else the new value."""
+ALIKE = 0.02
+"""Part of the largest harmonic of its component that a record's may differ from the steady motion's, if that motion's
+derivatives are to stand for the record's: they are then off by as little, which a search does not notice."""
 
-FACTORS = ("operation.speed", "operation.torque")
+KEPT = 16
+"""Motions that are kept for their derivatives: a search asks for those of the last ones."""
+
+Levels = dict[tuple[str, int], float]
+Key = tuple[str, tuple[float, ...]]
 
 
 class ProblemKeywords(TypedDict, total=False):
@@ -54,9 +57,11 @@ class ProblemKeywords(TypedDict, total=False):
     channels: Mapping[str, str] | None
     way: str
     workers: int
+    derivatives_by: Literal["steady", "differences"]
+    store: str | Path | None
 
 
-class CaseProblem:
+class CaseProblem(LevelProblem):
     """Measured harmonics, and cases that predict them.
 
     Parameters
@@ -77,6 +82,12 @@ class CaseProblem:
         How the levels were taken.
     workers : int
         Simulations side by side.
+    derivatives_by : {"steady", "differences"}
+        Of the steady motion, with one motion for residuals and Jacobian: a case at ``duration = "auto"`` is then that
+        motion, one with a duration is simulated as it is. Or differences of simulations, two for each parameter.
+    store : path-like, optional
+        A folder in which what was simulated is kept: a fit that was interrupted goes on from there, and another one of
+        the same cases, or its profiles, simulate nothing twice.
 
     Raises
     ------
@@ -94,21 +105,24 @@ class CaseProblem:
         channels: Mapping[str, str] | None = None,
         way: str = "band",
         workers: int = 1,
+        derivatives_by: Literal["steady", "differences"] = "steady",
+        store: str | Path | None = None,
     ) -> None:
         from gearmbs.studies import Case as CaseClass
         from gearmbs.studies.case.limits import HARMONICS
 
-        self.table = check_table(measured)
+        super().__init__(check_table(measured), gains)
         if isinstance(cases, CaseClass):
             cases = dict.fromkeys(self.table["case"], cases)
         if not isinstance(cases, Mapping) or not cases:
             raise IdentifyError("cases: give a Case, or cases by the names in the column case")
-        if way not in WAYS:
-            raise IdentifyError(f"way is {way!r}; choose one of {', '.join(WAYS)}")
+        for name, value, choices in (("way", way, WAYS), ("derivatives_by", derivatives_by, DERIVATIVES)):
+            if value not in choices:
+                raise IdentifyError(f"{name} is {value!r}; choose one of {', '.join(choices)}")
         precise = {"tolerance": TOLERANCE}
         self.cases = {str(name): case.as_one_of_many().changed(solver=precise) for name, case in cases.items()}
         self.way, self.workers = way, workers
-        self.free = [_in_si(item, self.cases) for item in ((free,) if isinstance(free, str | Free) else free)]
+        self.free = [in_si(item, self.cases) for item in ((free,) if isinstance(free, str | Free) else free)]
         paths = [path for item in self.free for path in (item.name, *item.also)]
         doubled = sorted({path for path in paths if paths.count(path) > 1})
         if doubled or not paths:
@@ -128,19 +142,17 @@ class CaseProblem:
                 f"channels={{...: "
                 f"one of {', '.join(COMPONENTS)}}}"
             )
-        self.gains, self.channels = gains, dict(channels or {})
-        self.groups = _groups(self.table, gains)
-        self._known: dict[tuple[str, tuple[float, ...]], dict[tuple[str, int], float]] = {}
+        self.channels = dict(channels or {})
+        self.derivatives_by, self.store = derivatives_by, None if store is None else Stored(Path(store))
+        self._known: dict[Key, Levels] = {}
+        self._slopes: dict[Key, np.ndarray] = {}
+        self._motions: dict[Key, SteadyLevels] = {}
+        self._without: dict[str, str] = {}
+        self.simulations = 0
 
-    @property
-    def lost(self) -> int:
-        """Degrees of freedom that the gains use up."""
-        return 0 if self.groups is None else int(self.groups.max()) + 1
-
-    @property
-    def simulations(self) -> int:
-        """Simulations so far."""
-        return len(self._known)
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies take: motions stay, and are found again where they are asked for."""
+        return self.__dict__ | {"_motions": {}}
 
     def with_case(self, name: str, case: Case, like: str, known: Sequence[str] = ()) -> CaseProblem:
         """Return the problem with one more case, measured as another one was; its values stand for none yet.
@@ -163,10 +175,11 @@ class CaseProblem:
             for path, factor in owned.items():
                 place = path.removeprefix(f"{like}:")
                 if place not in known:
-                    ratio = _field(f"{name}:{place}", cases)[0] / _field(path, cases)[0]
+                    ratio = field_of(f"{name}:{place}", cases)[0] / field_of(path, cases)[0]
                     tied[f"{name}:{place}"] = factor * ratio
             free.append(replace(item, also={**item.also, **tied}))
-        found = CaseProblem(table, cases, free, workers=self.workers, **settings)
+        found = CaseProblem(table, cases, free, workers=self.workers, derivatives_by=self.derivatives_by, **settings)
+        found.store = self.store
         found._known = dict(self._known)
         return found
 
@@ -190,12 +203,24 @@ class CaseProblem:
             found.append(float(value) if owners & {"", name} else float(free.start))
         return tuple(found)
 
-    def _simulate(self, key: tuple[str, tuple[float, ...]]) -> dict[tuple[str, int], float]:
+    def _simulate(self, key: Key) -> Levels:
+        """Return the levels of a case with parameters; none where it fails."""
+        case = self.case(*key)
+        if self.store is not None and (stored := self.store.levels(case, self.derivatives_by, self.way)) is not None:
+            return stored
+        self.simulations += 1
+        found = self._of_motion(key, case) if case.is_auto and self.derivatives_by == "steady" else None
+        if found is None:
+            found = self._of_run(case)
+        if self.store is not None:
+            self.store.keep_levels(case, self.derivatives_by, self.way, found)
+        return found
+
+    def _of_run(self, case: Case) -> Levels:
         from gearmbs.studies import SimulationFailed, run_case
 
-        name, p = key
         try:
-            record = run_case(self.case(name, p), False, variables=["gmf_rms"])
+            record = run_case(case, False, variables=["gmf_rms"])
             levels = record["gmf_rms"].sel(way=self.way)
         except (SimulationFailed, ValueError):
             return {}
@@ -205,18 +230,25 @@ class CaseProblem:
             for h in levels.harmonic.values
         }
 
+    def _of_motion(self, key: Key, case: Case) -> Levels | None:
+        """Return the levels of a case's steady motion, which is kept for its derivatives; None if it has none."""
+        from gearmbs.studies.run.steady_levels import levels_or_reason
+
+        found = levels_or_reason(case)
+        if isinstance(found, str):
+            self._without.setdefault(key[0], found)
+            return None
+        self._motions[key] = found
+        while len(self._motions) > max(KEPT, len(self.cases)):
+            self._motions.pop(next(iter(self._motions)))
+        return found.levels(self.way)
+
     def predictions(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return the logarithms of the predicted values, gains left out, for several parameter vectors; NaN where it
         fails."""
         names = list(dict.fromkeys(self.table["case"]))
         lost = np.full(len(self.table), np.nan)
-        keys = [(name, self._own(name, p)) for p in points if np.isfinite(p).all() for name in names]
-        new = [key for key in dict.fromkeys(keys) if key not in self._known]
-        if self.workers > 1 and len(new) > 1:
-            with ThreadPoolExecutor(self.workers) as pool:
-                self._known.update(zip(new, pool.map(self._simulate, new)))
-        else:
-            self._known.update((key, self._simulate(key)) for key in new)
+        self._find([(name, self._own(name, p)) for p in points if np.isfinite(p).all() for name in names])
         found = []
         for p in points:
             if not np.isfinite(p).all():
@@ -226,87 +258,142 @@ class CaseProblem:
             rows = zip(self.table["case"], self.components, self.table["harmonic"])
             levels = [own[str(n)].get((c, int(h)), np.nan) for n, c, h in rows]
             with np.errstate(all="ignore"):
-                found.append(self._without_gains(np.log(np.array(levels))))
+                found.append(self.without_gains(np.log(np.array(levels))))
         return found
 
-    def _without_gains(self, logs: np.ndarray) -> np.ndarray:
-        """Return logarithms less the weighted mean of their group."""
-        if self.groups is None:
-            return logs
-        weight = 1.0 / self.table["sigma"].to_numpy() ** 2
-        total = np.bincount(self.groups, weight)
-        mean = np.bincount(self.groups, weight * logs) / total
-        return logs - mean[self.groups]
+    def _find(self, keys: Sequence[Key]) -> None:
+        """Simulate what is not known yet."""
+        new = [key for key in dict.fromkeys(keys) if key not in self._known]
+        if self.workers > 1 and len(new) > 1:
+            with ThreadPoolExecutor(self.workers) as pool:
+                self._known.update(zip(new, pool.map(self._simulate, new)))
+        else:
+            self._known.update((key, self._simulate(key)) for key in new)
 
-    @property
-    def measured(self) -> np.ndarray:
-        """Logarithms of the measured values, gains left out."""
-        return self._without_gains(np.log(self.table["value"].to_numpy()))
+    def jacobian(self, p: np.ndarray) -> np.ndarray | None:
+        """Return the derivatives of the predictions by the parameters, shape (m, n); NaN where a simulation fails."""
+        if self.derivatives_by == "differences":
+            return None
+        p = np.asarray(p, dtype=float)
+        keys = {name: (name, self._own(name, p)) for name in dict.fromkeys(self.table["case"])}
+        self._find(list(keys.values()))
+        new = [key for key in keys.values() if key not in self._slopes]
+        if self.workers > 1 and len(new) > 1:
+            with ThreadPoolExecutor(self.workers) as pool:
+                self._slopes.update(zip(new, pool.map(self._slopes_of, new)))
+        else:
+            self._slopes.update((key, self._slopes_of(key)) for key in new)
+        rows = np.empty((len(self.table), len(self.free)))
+        for name, key in keys.items():
+            places = np.flatnonzero((self.table["case"] == name).to_numpy())
+            rows[places] = self._slopes[key]
+        return self.without_gains(rows)
 
-    @property
-    def sigma(self) -> np.ndarray:
-        """Standard deviations of the logarithms."""
-        return self.table["sigma"].to_numpy()
+    def _slopes_of(self, key: Key) -> np.ndarray:
+        """Return the derivatives of the logarithms of a case's rows of the table by the parameters."""
+        name, p = key
+        case = self.case(name, p)
+        free = [self._as_of(item, name) for item in self.free]
+        rows, store = self._rows_of(name), self.store
+        if store is not None and (stored := store.slopes(case, free, rows, self.way)) is not None:
+            return stored
+        own = [k for k, item in enumerate(free) if item is not None]
+        slopes = np.zeros((len(rows), len(free)))
+        by_motion = self._slopes_of_motion(key, own)
+        for k in own:
+            slopes[:, k] = by_motion[k] if k in by_motion else self._difference(key, k)
+        if store is not None:
+            store.keep_slopes(case, free, rows, self.way, slopes)
+        return slopes
 
-    def derivatives(self, p: Sequence[float] | None = None) -> np.ndarray:
-        """Return the derivatives of the predictions over their standard deviations, shape (m, n).
+    def _as_of(self, item: Free, name: str) -> Free | None:
+        """Return a parameter as that of one case, None if it has no part in it."""
+        paths = {path: factor for path, factor in {item.name: 1.0, **item.also}.items()}
+        own = {path: f for path, f in paths.items() if path.rpartition(":")[0] in ("", name)}
+        return Free(item.name, 1.0, also=own) if own else None
 
-        They are those by the logarithm of each parameter; of one fitted as it is, times its magnitude, which is the
-        same, or where that is zero half the distance of its bounds, if it has any.
-        """
-        return self._derivatives(p)[0]
+    def _rows_of(self, name: str) -> list[tuple[str, int]]:
+        """Return component and harmonic of the rows of the table that belong to a case."""
+        rows = zip(self.table["case"], self.components, self.table["harmonic"])
+        return [(c, int(h)) for n, c, h in rows if n == name]
 
-    def _derivatives(self, p: Sequence[float] | None) -> tuple[np.ndarray, np.ndarray, Any]:
-        scale = Scale(tuple(self.free))
-        z = scale.z([f.start for f in self.free] if p is None else p)
+    def _slopes_of_motion(self, key: Key, own: list[int]) -> dict[int, np.ndarray]:
+        """Return derivatives by the steady motion, by the numbers of the parameters it has some for."""
+        name, p = key
+        known = self._known[key]
+        if name in self._without or not known or not own:
+            return {}
+        if key not in self._motions:
+            self.simulations += 1
+            found = self._of_motion(key, self.case(name, p))
+            if found is None:
+                return {}
+            self._check_alike(name, known, found)
+            if name in self._without:
+                return {}
+        motion = self._motions[key]
 
-        def many(points: Sequence[np.ndarray]) -> list[np.ndarray]:
-            return [f / self.sigma for f in self.predictions([scale.p(q) for q in points])]
+        def changed(**values: float) -> Case:
+            return self.case(name, [values.get(f"p{k}", old) for k, old in enumerate(p)])
 
-        h = SIMULATION_STEP * self._magnitudes(z)
-        matrix = central(many, z, h)
-        if not np.isfinite(matrix).all():
-            raise IdentifyError("the simulations fail about the start; give another one")
-        return matrix * self._magnitudes(z), h, many
+        sizes = {k: self._size(k, p[k]) for k in own}
+        found_by, refused = motion.derivatives(changed, {f"p{k}": (p[k], sizes[k]) for k in own})
+        for k in own:
+            if (reason := refused.get(f"p{k}")) is not None:
+                self._note(f"{self.free[k].name}: derivatives by differences: {reason}")
+        rows = self._rows_of(name)
+        return {
+            k: np.array([of[row] for row in rows])
+            for k in own
+            if f"p{k}" in found_by
+            for of in [motion.slopes(self.way, found_by[f"p{k}"])]
+        }
 
-    def _magnitudes(self, z: np.ndarray) -> np.ndarray:
-        """Return by what derivatives in z become those by logarithms."""
-        low, high = Scale(tuple(self.free)).bounds()
-        reach = np.where(np.isfinite(high - low), 0.5 * (high - low), 1.0)
-        return np.where([f.log for f in self.free], 1.0, np.where(z == 0.0, reach, np.abs(z)))
+    def _check_alike(self, name: str, known: Levels, motion: Levels) -> None:
+        """Note if the record of a case is not the steady motion whose derivatives would stand for its own."""
+        for component in {c for c, _ in known}:
+            largest = max(v for (c, _), v in motion.items() if c == component)
+            apart = max(abs(known[row] - v) for row, v in motion.items() if row[0] == component)
+            if not apart <= ALIKE * largest:
+                part = apart / largest if largest > 0.0 else float("inf")
+                self._without[name] = (
+                    f"its record differs from its steady motion by {100 * part:.2g} % of the largest {component}"
+                )
 
-    def identifiability(
-        self, p: Sequence[float] | None = None, *, noise: bool = True, limit: float = LIMIT
-    ) -> Identifiability:
-        """Return what the measured numbers can tell at p, default the starts: four simulations a parameter and case.
+    def _size(self, k: int, value: float) -> float:
+        """Return of what size a parameter is."""
+        item = self.free[k]
+        if item.log or value != 0.0:
+            return abs(value)
+        ends = [end for end in (item.low, item.high) if end is not None]
+        return 0.5 * (max(ends) - min(ends)) if len(ends) == 2 else 1.0
 
-        Parameters
-        ----------
-        noise : bool
-            Judge the noise of the differences, too, at half the step; else two simulations suffice.
-        """
-        matrix, h, many = self._derivatives(p)
-        scale = Scale(tuple(self.free))
-        z = scale.z([f.start for f in self.free] if p is None else p)
-        size = self._magnitudes(z)
-        floor = size * noise_of_columns(many, z, h, matrix / size) if noise else np.zeros(len(self.free))
-        return Identifiability(scale.names, matrix, floor, limit)
+    def _difference(self, key: Key, k: int) -> np.ndarray:
+        """Return the derivatives of the logarithms of a case's rows by one parameter, as central differences."""
+        name, p = key
+        if name in self._without:
+            self._note(f"case {name!r}: derivatives by differences: {self._without[name]}")
+        by = SIMULATION_STEP * self._size(k, p[k])
+        sides = [(name, tuple(v + way * by * (j == k) for j, v in enumerate(p))) for way in (1.0, -1.0)]
+        self._find(sides)
+        rows = self._rows_of(name)
+        with np.errstate(all="ignore"):
+            above, below = (np.log([self._known[side].get(row, np.nan) for row in rows]) for side in sides)
+        return (above - below) / (2.0 * by)
 
-    def fit(self, **settings: Unpack[FitKeywords]) -> Fit:
-        """Find the parameters; see `gearmbs.identify.fit` for the settings.
+    def _note(self, line: str) -> None:
+        if line not in self.notes:
+            self.notes.append(line)
 
-        The step and the end of the search are those that fit the integrator's noise.
-        """
-        chosen: FitKeywords = {"step": SIMULATION_STEP, "tolerance": 1e-4, **settings}
-        return fit(
-            lambda p: self.predictions([p])[0],
-            self.measured,
-            self.free,
-            sigma=self.sigma,
-            many=self.predictions,
-            lost=self.lost,
-            **chosen,
-        )
+    def coarser(self) -> CaseProblem:
+        """Return the same problem at a tolerance ten times as large."""
+        cases = {name: one.changed(solver={"tolerance": COARSER * TOLERANCE}) for name, one in self.cases.items()}
+        found = CaseProblem(
+            self.table, cases, self.free, gains=self.gains, channels=self.channels, way=self.way, workers=self.workers,
+            derivatives_by=self.derivatives_by,
+        )  # fmt: skip
+        found.cases, found.store = cases, self.store
+        return found
 
 
 def identify(
@@ -382,181 +469,3 @@ def compare_models(problems: Mapping[str, CaseProblem], **settings: Unpack[FitKe
     table["weight"] = weight / weight.sum()
     table.attrs["fits"] = fits
     return table
-
-
-def _groups(table: pd.DataFrame, gains: str) -> np.ndarray | None:
-    """Return which free gain each row has."""
-    keys = {
-        "none": None,
-        "one": [],
-        "channel": ["channel"],
-        "case": ["case", "channel"],
-        "line": ["channel", "harmonic"],
-    }
-    if gains not in keys:
-        raise IdentifyError(f"gains is {gains!r}; choose one of {', '.join(keys)}")
-    columns = keys[gains]
-    if columns is None:
-        return None
-    rows = list(zip(*(table[c] for c in columns))) if columns else [()] * len(table)
-    places = {row: k for k, row in enumerate(dict.fromkeys(rows))}
-    return np.array([places[row] for row in rows])
-
-
-def _in_si(item: Free | str, cases: Mapping[str, Case]) -> Free:
-    """Return a parameter with its start and bounds in SI; a path starts at its case's value."""
-    path = item if isinstance(item, str) else item.name
-    value, unit = _field(path, cases)
-    if isinstance(item, str):
-        return Free(path, value, log=value > 0.0)
-    for other in item.also:
-        _field(other, cases)
-
-    def number(given: Any) -> Any:
-        try:
-            return None if given is None else to_si(given, unit, path)
-        except (ValueError, TypeError) as error:
-            raise IdentifyError(str(error)) from None
-
-    found = replace(item, start=number(item.start), low=number(item.low), high=number(item.high))
-    # refused here rather than after the simulations that come first
-    Scale((found,)).bounds()
-    return found
-
-
-def _field(path: str, cases: Mapping[str, Case]) -> tuple[float, str]:
-    """Return the value and the SI unit of a number of a case, whose name may stand before the path."""
-    from gearmbs.studies.case.sections import units_of_fields
-
-    owner, _, place = path.rpartition(":")
-    if owner and owner not in cases:
-        raise IdentifyError(f"{path}: there is no case {owner!r}; the cases are {', '.join(cases)}")
-    section, _, field = place.partition(".")
-    holder = getattr(cases[owner] if owner else next(iter(cases.values())), section, None)
-    if holder is None or field not in getattr(type(holder), "model_fields", {}):
-        raise IdentifyError(f"{path}: a case has no such field; write section.field, for instance contact.depth")
-    unit = units_of_fields(holder).get(field, "1")
-    unit = "dimensionless" if unit == "1" else unit
-    try:
-        return to_si(getattr(holder, field), unit, path), unit
-    except (ValueError, TypeError):
-        raise IdentifyError(f"{path} is {getattr(holder, field)!r}, which is no number that could be fitted") from None
-
-
-def check_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of harmonics with its columns checked; ``sigma`` is 2 % where it is missing.
-
-    Raises
-    ------
-    IdentifyError
-        For missing columns and values that have no logarithm.
-    """
-    import pandas as pd
-
-    if not isinstance(table, pd.DataFrame):
-        raise IdentifyError(f"measured is a {type(table).__name__}; give a DataFrame with {', '.join(COLUMNS)}")
-    missing = [c for c in COLUMNS[:4] if c not in table.columns]
-    if missing:
-        raise IdentifyError(f"measured: columns {', '.join(missing)} are missing; give {', '.join(COLUMNS)}")
-    if table.empty:
-        raise IdentifyError("measured: the table has no rows")
-    table = table.copy()
-    for name in ("case", "channel"):
-        if table[name].isna().any():
-            raise IdentifyError(f"measured: {name} is missing in a row")
-        table[name] = table[name].map(str)
-    if "sigma" not in table.columns:
-        table["sigma"] = 0.02
-    for name in ("harmonic", "value", "sigma"):
-        try:
-            table[name] = pd.to_numeric(table[name])
-        except (ValueError, TypeError) as error:
-            raise IdentifyError(f"measured: column {name}: {error}") from None
-    if not ((table["harmonic"] >= 1) & (table["harmonic"] % 1 == 0)).all():
-        raise IdentifyError("measured: harmonic must be a whole number, 1 or more, in every row")
-    finite = np.isfinite(table[["value", "sigma"]].to_numpy(dtype=float)).all()
-    if not (finite and ((table["value"] > 0.0) & (table["sigma"] > 0.0)).all()):
-        raise IdentifyError("measured: value and sigma must be positive and finite in every row; leave out the others")
-    return table.reset_index(drop=True)
-
-
-@staged("ranking experiments")
-def rank_experiments(
-    problem: CaseProblem,
-    candidates: Mapping[str, Mapping[str, Any]] | None = None,
-    *,
-    of: str | None = None,
-    progress: Callable[[float, str], None] | None = None,
-) -> pd.DataFrame:
-    """Rank further measurements by how much better the worst known combination would be known.
-
-    Each candidate is simulated about the starts and added to what was measured, with the same channels, harmonics,
-    standard deviations and gains. What is unknown of the case that is changed is so of the candidate, too: twice an
-    unknown torque is unknown. What a candidate gives as a value with its unit is known.
-
-    Parameters
-    ----------
-    problem : CaseProblem
-    candidates : mapping, optional
-        By name what is changed of a case: fields with values in any unit, of speed and torque numbers are factors.
-        Default `EXPERIMENTS`.
-    of : str, optional
-        Case that is changed; default the first.
-    progress : callable, optional
-        Called as progress(fraction, experiment); without it a bar is shown where somebody watches.
-
-    Returns
-    -------
-    DataFrame
-        By experiment, best first: ``worst``, the standard deviation of the worst known combination of logarithms with
-        it; ``gain``, the factor by which that is better than without; ``together``, the largest of the parameters' own.
-        Experiments that cannot be simulated are last, with NaN.
-
-    Raises
-    ------
-    IdentifyError
-        For fields that a case does not have.
-    """
-    import pandas as pd
-
-    before = np.linalg.svd(problem.derivatives(), compute_uv=False)[-1]
-    rows = {}
-    asked = EXPERIMENTS if candidates is None else candidates
-    for k, (name, changes) in enumerate(asked.items()):
-        if progress is not None:
-            progress((k + 1) / (len(asked) + 1), name)
-        rows[name] = _worth(problem, name, changes, of or next(iter(problem.cases)), before)
-    table = pd.DataFrame.from_dict(rows, orient="index").sort_values("worst", na_position="last")
-    table.index.name = "experiment"
-    return table
-
-
-def _worth(problem: CaseProblem, name: str, changes: Mapping[str, Any], of: str, before: float) -> dict[str, float]:
-    """Return what an experiment is worth."""
-    from gearmbs.identify.parameters import errors_of
-
-    given = [path for path, value in changes.items() if path not in FACTORS or isinstance(value, str)]
-    joint = problem.with_case(name, _changed(problem, changes, of), like=of, known=given)
-    try:
-        matrix = joint.derivatives()
-    except IdentifyError:
-        return {"worst": float("nan"), "gain": float("nan"), "together": float("nan")}
-    after = np.linalg.svd(matrix, compute_uv=False)[-1]
-    with np.errstate(all="ignore"):
-        largest = float(errors_of(matrix)[0].max())
-        return {"worst": float(1.0 / after), "gain": float(after / before), "together": largest}
-
-
-def _changed(problem: CaseProblem, changes: Mapping[str, Any], of: str) -> Any:
-    case = problem.cases[of]
-    sections: dict[str, Any] = {}
-    for path, value in changes.items():
-        section, _, field = path.partition(".")
-        holder = getattr(case, section, None)
-        if holder is None or field not in type(holder).model_fields:
-            raise IdentifyError(f"experiment: a case has no field {path!r}; write section.field")
-        if path in FACTORS and not isinstance(value, str):
-            value = float(value) * float(getattr(holder, field))
-        sections.setdefault(section, {})[field] = value
-    # rates follow the mesh frequency unless they are given
-    return case.changed(**sections)

@@ -34,7 +34,7 @@ def identify(
         text = ["# What the measurement can tell", "", *_rows(found.table()), ""]
         text += [f"* {line}" for line in found.remarks()] or ["* every parameter is determined"]
         if experiments:
-            from gearmbs.identify.cases import rank_experiments
+            from gearmbs.identify.experiments import rank_experiments
 
             ranked = rank_experiments(problem, settings["experiments"])
             text += ["", "# What further measurements would add", "", *_rows(ranked), ""]

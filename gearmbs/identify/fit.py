@@ -86,6 +86,8 @@ USUAL_STEPS = 10
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 POLISH = 50
 """Gauss-Newton steps at most after the search."""
+PROFILED = 1e-8
+"""Least tolerance at which searches of a profile end: its thresholds are read to a thousandth."""
 
 
 class FitKeywords(TypedDict, total=False):
@@ -110,6 +112,7 @@ def fit(
     sigma: ArrayLike | None = None,
     absolute_sigma: bool = True,
     many: Callable[[Sequence[np.ndarray]], list[np.ndarray]] | None = None,
+    jacobian: Callable[[np.ndarray], np.ndarray | None] | None = None,
     step: float = SMOOTH_STEP,
     starts: int = 1,
     loss: str = "linear",
@@ -134,6 +137,9 @@ def fit(
         residuals: for a model that does not describe everything measured.
     many : callable, optional
         Predictions for several parameter vectors at once; default one after the other.
+    jacobian : callable, optional
+        ``jacobian(p)`` returns the derivatives of the prediction by the parameters, shape (m, n), or None where there
+        are none; default central differences.
     step : float
         Of the differences, in ln p or as a part of p; `gearmbs.identify.fit.SIMULATION_STEP` for simulations.
     starts : int
@@ -173,9 +179,11 @@ def fit(
         raise IdentifyError(f"fit: loss is {loss!r}; choose one of {', '.join(LOSSES)}")
     if not (isinstance(starts, int) and starts >= 1):
         raise IdentifyError(f"fit: starts = {starts!r}; give a whole number, 1 or more")
-    problem = _Problem(model, measured, free, sigma, many, step, lost, absolute_sigma)
+    problem = _Problem(model, measured, free, sigma, many, step, lost, absolute_sigma, jacobian)
+    problem.end = max(tolerance, PROFILED)
     if progress is not None:
-        problem.tell = progress_of_runs(progress, starts * USUAL_STEPS * (2 * len(free) + 1))
+        each = 1 if jacobian is not None else 2 * len(free) + 1
+        problem.tell = progress_of_runs(progress, starts * USUAL_STEPS * each)
     low, high = problem.scale.bounds()
     attempts = []
     for z0 in _starts(problem.scale, low, high, starts, seed):
@@ -210,7 +218,7 @@ def _real(values: ArrayLike) -> np.ndarray:
 class _Problem:
     """Weighted residuals of a model over z."""
 
-    def __init__(self, model, measured, free, sigma, many, step, lost, absolute_sigma) -> None:
+    def __init__(self, model, measured, free, sigma, many, step, lost, absolute_sigma, jacobian) -> None:
         self.scale = Scale(tuple(free))
         names = self.scale.names
         if len(set(names)) < len(names):
@@ -241,7 +249,8 @@ class _Problem:
         if not ((self.sigma > 0.0) & (self.sigma < np.inf)).all():
             raise IdentifyError("fit: every sigma must be positive and finite; leave out values that say nothing")
         self._many = many or (lambda points: [_real(model(p)) for p in points])
-        self.step, self.lost = step, lost
+        self.step, self.lost, self._own = step, lost, jacobian
+        self.end = PROFILED
         self.runs = self.total = self.without = 0
         self.tell: Callable[[int], None] = lambda done: None
 
@@ -264,7 +273,17 @@ class _Problem:
         return np.where(np.isfinite(r), r, 1e10)
 
     def jacobian(self, z: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Return their central differences."""
+        """Return their derivatives, the model's own or central differences."""
+        p = self.scale.p(z)
+        own = None if self._own is None else self._own(p)
+        if own is not None:
+            if np.shape(own) != (self.measured.size, z.size):
+                raise IdentifyError(
+                    f"fit: jacobian returned shape {np.shape(own)} for {self.measured.size} values and {z.size} "
+                    "parameters; give the derivative of each value by each parameter"
+                )
+            slopes = np.asarray(own, dtype=float) / self.sigma[:, None] * np.where(self.scale.logs, p, 1.0)
+            return np.where(np.isfinite(slopes), slopes, 0.0)
         matrix = central(self.residuals, z, steps(z, self.scale.logs, self.step), low, high)
         return np.where(np.isfinite(matrix), matrix, 0.0)
 
@@ -273,10 +292,11 @@ class _Problem:
         r, matrix = self.residual(z), self.jacobian(z, low, high)
         return Fit.of(self, z, r, matrix, waterfall=waterfall, runs=runs)
 
-    def refit(self, fixed: int, value: float, z: np.ndarray, tolerance: float) -> tuple[np.ndarray, float]:
+    def refit(self, fixed: int, value: float, z: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the other parameters' best z and the cost r.r with one held at a value."""
         from scipy.optimize import least_squares
 
+        tolerance = self.end
         low, high = self.scale.bounds()
         others = [k for k in range(len(z)) if k != fixed]
 
@@ -341,6 +361,8 @@ def _search(problem: _Problem, z0, low, high, loss, tolerance, most_runs) -> tup
                 **({"bounds": (low, high), "loss": loss} if method == "trf" else {}),
                 **settings,
             )
+        except IdentifyError:
+            raise
         except (ValueError, np.linalg.LinAlgError):
             continue
         if best is None or found.cost < best[1] * (1.0 - 1e-10):

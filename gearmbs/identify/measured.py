@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 
-from gearmbs.identify.cases import COLUMNS, WAYS, CaseProblem
+from gearmbs.identify.cases import WAYS, CaseProblem
 from gearmbs.identify.parameters import Free, IdentifyError
+from gearmbs.identify.tables import COLUMNS
 from gearmbs.schema.described import check_keys, chosen, make, read_toml
 from gearmbs.schema.quantities import Measure
 

@@ -138,6 +138,8 @@ class Fit:
         Half the costs at which the searches ended, best first: if several are lowest, it is found more than once.
     runs : int
         Evaluations of the model.
+    notes : tuple of str
+        How the predictions were made, where that needs a word.
     """
 
     names: list[str]
@@ -156,6 +158,7 @@ class Fit:
     singular_values: np.ndarray
     problem: Any = field(repr=False, default=None)
     loss: str = "linear"
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, problem: Any, z: np.ndarray, r: np.ndarray, matrix: np.ndarray, *, waterfall: list, runs: int) -> Fit:
@@ -282,7 +285,7 @@ class Fit:
         for side in (at[at < self.z[k]][::-1], at[at >= self.z[k]]):
             z = self.z
             for value in side[(side >= low[k]) & (side <= high[k])]:
-                z, cost = self.problem.refit(k, float(value), z, 1e-8)
+                z, cost = self.problem.refit(k, float(value), z)
                 p = self.scale.p(z)
                 rows.append({"value": float(p[k]), "rise": (cost - self.cost) / unit} | dict(zip(self.names, p)))
         return pd.DataFrame(rows).sort_values("value", ignore_index=True)
@@ -315,7 +318,7 @@ class Fit:
                 f"to {row.high:.5g} |"
             )
         lines += ["", f"{self.residuals.size} values, {self.freedom} degrees of freedom, {self.runs} evaluations."]
-        lines += self._reservations()
+        lines += [*self._reservations(), *self.notes]
         if self.known_noise:
             lines.append(f"Chi-square over degrees of freedom: {self.chi_square:.3g}.")
             if self.freedom > 0 and chi2.sf(self.cost, self.freedom) < DOUBTFUL:

@@ -30,6 +30,7 @@ DEPTH = ("contact.depth",)
         ({"measured": TABLE.assign(harmonic=7)}, "harmonic 7; cases give the first 3"),
         ({"cases": {}}, "give a Case, or cases by"),
         ({"way": "peaks"}, "way is 'peaks'; choose one of band, orders"),
+        ({"derivatives_by": "hand"}, "derivatives_by is 'hand'; choose one of steady, differences"),
         ({"free": []}, "free: give a parameter"),
         ({"free": [*DEPTH, *DEPTH]}, "free: contact.depth more than once"),
         ({"free": ["fault.plane"]}, "is 'skew', which is no number"),
@@ -97,10 +98,8 @@ def test_amounts_are_told_by_their_share_as_logarithms_are(monkeypatch):
         return [np.log(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])) * (p[0] / 1e-4) for p in points]
 
     monkeypatch.setattr(CaseProblem, "predictions", predictions)
-    tables = [
-        CaseProblem(TABLE, Case(), [Free("contact.depth", 1e-4, log=log)]).identifiability().table()
-        for log in (True, False)
-    ]
+    free = [Free("contact.depth", 1e-4, log=log) for log in (True, False)]
+    tables = [CaseProblem(TABLE, Case(), one, derivatives_by="differences").identifiability().table() for one in free]
     np.testing.assert_allclose(tables[0]["together"], tables[1]["together"], rtol=1e-3)
 
 

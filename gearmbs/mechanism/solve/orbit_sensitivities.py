@@ -33,7 +33,11 @@ from gearmbs.mechanism.solve.simulate import prepared, start_time
 from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
+    from gearmbs.dae.model.members import Members
+    from gearmbs.dae.model.system import System
     from gearmbs.mechanism.solve.keywords import OrbitOptions
+
+    Made = tuple[System, DAEProblem, Members | None, str]
 
 
 @dataclass(frozen=True)
@@ -121,15 +125,38 @@ def steady_sensitivities(
         mechanism, period, t_start=t_start, initial=initial, formulation=formulation, tol=tol, rate_scale=rate_scale,
         lump=lump, **settings,
     )  # fmt: skip
-    orbit, lumped = motion.orbit, True if lump is None else lump
+    lumped = True if lump is None else lump
     assembled_at = 0.0 if initial is None else initial.t_model
 
-    def made(key: str, value: float) -> tuple:
+    def made(key: str, value: float) -> Made:
         other = built(build, values | {key: value})
         check_functions(key, mechanism, other)
         return prepared(other, assembled_at, lumped, formulation, rate_scale, initial is not None)
 
     own = prepared(mechanism, assembled_at, lumped, formulation, rate_scale, initial is not None)[1]
+    return derived_motion(motion, values, scales, made, own)
+
+
+def derived_motion(
+    motion: SteadyMotion,
+    values: dict[str, float],
+    scales: dict[str, float],
+    made: Callable[[str, float], Made],
+    own: DAEProblem,
+) -> SteadySensitivities:
+    """Return a steady motion with its derivatives by parameters; see `steady_sensitivities`.
+
+    Parameters
+    ----------
+    motion : SteadyMotion
+    values, scales : dict of float
+        Of the parameters, by name.
+    made : callable
+        ``made(name, value)`` returns system, problem, members and advice of the model with another value of one.
+    own : DAEProblem
+        As assembled with these values.
+    """
+    orbit = motion.orbit
     # what the motion has changed of the tables on its way to the orbit: turns that are counted, numbers that are set
     gone, there = orbit.problem.rdata - own.rdata, orbit.problem.idata != own.idata
 

@@ -85,6 +85,22 @@ class Sensitivities:
         ModelError
             For a parameter that was not asked for.
         """
+        (above, below), by = self.beside(parameter)
+
+        def of(solution: Solution) -> np.ndarray:
+            found = solution.evaluate(result) if isinstance(result, str) else result(solution)
+            return np.asarray(found, dtype=float)
+
+        return (of(above) - of(below)) / (2.0 * by)
+
+    def beside(self, parameter: str) -> tuple[tuple[Solution, Solution], float]:
+        """Return the solutions at p + e and p - e, and e: what is asked of both is differentiated by their difference.
+
+        Raises
+        ------
+        ModelError
+            For a parameter that was not asked for.
+        """
         if parameter not in self.values:
             there = list(self.values)
             hint = did_you_mean(parameter, there, shown=repr, otherwise=f"there is {', '.join(there)}")
@@ -96,12 +112,7 @@ class Sensitivities:
         by = MOST * self._scales[parameter]
         if most > 0.0:
             by = min(by, MOVED / most)
-
-        def of(solution: Solution) -> np.ndarray:
-            found = solution.evaluate(result) if isinstance(result, str) else result(solution)
-            return np.asarray(found, dtype=float)
-
-        return (of(self._beside(parameter, by)) - of(self._beside(parameter, -by))) / (2.0 * by)
+        return (self._beside(parameter, by), self._beside(parameter, -by)), by
 
     def __repr__(self) -> str:
         by = ", ".join(f"{name} = {value:g}" for name, value in self.values.items())

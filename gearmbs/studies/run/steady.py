@@ -142,6 +142,11 @@ def steady_case(case: Case, *, variables: Collection[str] | None = None, most: i
     NoOrbit
         See `steady`.
     """
+    return found_case(case, variables=variables, most=most)[0]
+
+
+def found_case(case: Case, *, variables: Collection[str] | None, most: int) -> tuple[SteadyCase, np.ndarray]:
+    """Return the steady motion of a case, and by what each unknown advances in a period of its wheels."""
     check_variables(variables)
     case, posed, at, tol = posed_case(case)
     meshes = geometric_period(case)
@@ -152,9 +157,11 @@ def steady_case(case: Case, *, variables: Collection[str] | None = None, most: i
     )  # fmt: skip
     solution = posed.solution(orbit)
     found = round(orbit.period * case.mesh_frequency)
-    dataset = _recorded(case, solution, found, at.advance * (found // meshes), orbit.error, variables)
+    recorder = period_recorder(case, solution, found, at.advance * (found // meshes), orbit.error)
+    dataset = evaluated_period(case, solution, recorder, variables)
+    dataset.attrs |= recorder.attributes()
     dataset.attrs["orbit_multiplier"] = abs(orbit.largest)
-    return SteadyCase(solution, orbit, posed.state(orbit), dataset)
+    return SteadyCase(solution, orbit, posed.state(orbit), dataset), at.advance
 
 
 def posed_case(case: Case) -> tuple[Case, Posed, AtValue, float]:
@@ -295,10 +302,8 @@ def _balanced(moment: Any, most: float) -> float:
     raise NoOrbit("the teeth do not carry the load at any angle within half a pitch; run_case tells what happens")
 
 
-def _recorded(
-    case: Case, solution: Solution, meshes: int, advance: np.ndarray, error: float, variables: Collection[str] | None
-) -> xr.Dataset:
-    """Return the record of a period: what lies ahead of it and behind it are repetitions."""
+def period_recorder(case: Case, solution: Solution, meshes: int, advance: np.ndarray, error: float) -> PeriodicRecorder:
+    """Return what the record of a period is made from: what lies ahead of it and behind it are repetitions."""
     # it begins and ends between steps: times of copies of one step differ in their last digits
     recorder = PeriodicRecorder(case, begin=float(solution.t[:2].mean()))
     t, y = solution.t, solution.result.y
@@ -311,6 +316,4 @@ def _recorded(
     for part in solution.over(times, states, solution.result.epochs).parts():
         recorder.take(part)
     recorder.found, recorder.deviation = Found(meshes, meshes), error
-    dataset = evaluated_period(case, solution, recorder, variables)
-    dataset.attrs |= recorder.attributes()
-    return dataset
+    return recorder
