@@ -7,6 +7,9 @@ from .identifiability import Identifiability as Identifiability
 from .identifiability import Surrogate as Surrogate
 from .identifiability import posterior as posterior
 from .measured import harmonic_table as harmonic_table
+from .models import MotionProblem as MotionProblem
+from .models import SignalProblem as SignalProblem
+from .models import order_table as order_table
 from .parameters import Fit as Fit
 from .parameters import Free as Free
 from .parameters import IdentifyError as IdentifyError

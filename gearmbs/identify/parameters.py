@@ -19,6 +19,9 @@ DOUBTFUL = 0.01
 CORRELATED = 0.95
 """Correlation from which two parameters are said to be told apart badly."""
 
+POINTS = 9
+"""Values of a profile whose ends stand in a table: they are interpolated in the root of its rise, almost a line."""
+
 PART_OF_LOST = 1e-6
 """Part of a unit direction without influence below which a parameter has none in it: far above rounding, 1e-15."""
 
@@ -235,21 +238,31 @@ class Fit:
     def _count(self) -> int:
         return len(self.names) + (0 if self.known_noise else 1)
 
-    def table(self, level: float = LEVEL) -> pd.DataFrame:
-        """Return value, standard error, relative error and interval by parameter."""
+    def table(self, level: float = LEVEL, *, profiles: bool = False) -> pd.DataFrame:
+        """Return value, standard error, relative error and interval by parameter.
+
+        Parameters
+        ----------
+        level : float
+            Probability of the intervals.
+        profiles : bool
+            Those of the profiles, too, ``profile_low`` and ``profile_high``: where they differ from the linear ones the
+            predictions bend within the errors.
+        """
         import pandas as pd
 
         ends = [self.interval(name, level) for name in self.names]
-        return pd.DataFrame(
-            {
-                "value": self.values,
-                "error": self.errors,
-                "relative": self.errors / np.abs(self.values),
-                "low": [a for a, _ in ends],
-                "high": [b for _, b in ends],
-            },
-            index=pd.Index(self.names, name="parameter"),
-        )
+        columns = {
+            "value": self.values,
+            "error": self.errors,
+            "relative": self.errors / np.abs(self.values),
+            "low": [a for a, _ in ends],
+            "high": [b for _, b in ends],
+        }
+        if profiles:
+            ends = [self.profile_interval(name, level, points=POINTS) for name in self.names]
+            columns |= {"profile_low": [a for a, _ in ends], "profile_high": [b for _, b in ends]}
+        return pd.DataFrame(columns, index=pd.Index(self.names, name="parameter"))
 
     def profile(self, name: str, points: int = 9, reach: float = 3.0) -> pd.DataFrame:
         """Return the least cost over values of one parameter, all others fitted again at each.
