@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Integral
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +15,11 @@ from gearmbs.gears.mesh import Mesh, require_points, varying_along_face
 from gearmbs.gears.modifications import face_sections
 from gearmbs.gears.tables import most_pairs, pack
 from gearmbs.progress import waiting
-from gearmbs.units import Quantity, to_si
+from gearmbs.units import Quantity, QuantityLike, to_si
 from gearmbs.wording import warn
+
+if TYPE_CHECKING:
+    from gearmbs.gears.curve_accuracy import CurveErrors
 
 SIDE, TOOTH_1, TOOTH_2, GAP = (GAP_COLUMNS.index(name) for name in ("side", "tooth_1", "tooth_2", "gap"))
 NORMAL_FORCE, PAIRS_DRIVE = layout.place(layout.TOTALS, "normal_force"), layout.place(layout.TOTALS, "pairs_drive")
@@ -61,6 +65,8 @@ class TransmissionError:
         Mesh cycles covered.
     extremes : tuple of float, optional
         Smallest and largest error where they are known better than from the points, m.
+    errors : CurveErrors, optional
+        Numerical errors of these, where an accuracy was asked for.
     """
 
     phase: np.ndarray
@@ -71,6 +77,7 @@ class TransmissionError:
     stiffness: np.ndarray
     cycles: int = 1
     extremes: tuple[float, float] | None = None
+    errors: CurveErrors | None = None
 
     @property
     def mean(self) -> float:
@@ -303,7 +310,13 @@ def touching_angle(pair: Mesh, driver_angle: float = 0.0) -> float:
 
 
 def kinematic_transmission_error(
-    pair: Mesh, points: int = 400, slices: int | None = None, *, start: float = 0.0, cycles: int = 1
+    pair: Mesh,
+    points: int = 400,
+    slices: int | None = None,
+    *,
+    start: float = 0.0,
+    cycles: int = 1,
+    accuracy: QuantityLike | None = None,
 ) -> TransmissionError:
     """Transmission error at vanishing load: the wheels touch without pressing.
 
@@ -321,14 +334,35 @@ def kinematic_transmission_error(
         Driver angle to begin with, in pitch angles of the driver.
     cycles : int
         Mesh cycles; as many as the driver's teeth for a turn of it, to see faults of all teeth.
+    accuracy : float or str, optional
+        To what part of the peak to peak the curve is to be known, such as "1 %" or 0.01. Points, and slices that are
+        not given, are chosen for it, and ``errors`` tells; see `gearmbs.gears.curve_accuracy`.
 
     Warns
     -----
     UserWarning
-        If faults sit on teeth that do not pass the mesh, if the teeth jam, or if one slice stands for flanks that vary
-        along the face.
+        Of an accuracy that is not reached; if faults sit on teeth that do not pass the mesh, if the teeth jam, or if
+        one slice stands for flanks that vary along the face.
     """
     phase = _phases(pair, points, slices, start, cycles)
+    if accuracy is not None:
+        return _accurate(
+            lambda n, count: _touching_curve(pair, start + np.arange(n * int(cycles)) / n, n, count, cycles),
+            pair, accuracy, points, slices,
+        )  # fmt: skip
+    return _touching_curve(pair, phase, points, slices, cycles)
+
+
+def _accurate(
+    curve: Callable[[int, int], TransmissionError], pair: Mesh, accuracy: QuantityLike, points: int, slices: int | None
+) -> TransmissionError:
+    from gearmbs.gears.curve_accuracy import accurate_curve
+
+    return accurate_curve(curve, pair, accuracy, points, slices)
+
+
+def _touching_curve(pair: Mesh, phase: np.ndarray, points: int, slices: int | None, cycles: int) -> TransmissionError:
+    """Return the transmission error at vanishing load at some phases."""
     mesh = StaticMesh(pair, slices)
     side, rb = mesh.rotation, mesh.geometry.driven.base_radius
 
@@ -352,6 +386,7 @@ def loaded_transmission_error(
     *,
     start: float = 0.0,
     cycles: int = 1,
+    accuracy: QuantityLike | None = None,
 ) -> TransmissionError:
     """Quasi-static transmission error under load: rigid wheels, contact compliance only, no friction.
 
@@ -360,8 +395,8 @@ def loaded_transmission_error(
     pair : GearPair or Mesh
     torque : float or str, optional
         On the driven wheel, N m; default that of the pair's operating point.
-    points, slices, start, cycles
-        As for `kinematic_transmission_error`.
+    points, slices, start, cycles, accuracy
+        As for `kinematic_transmission_error`; the accuracy is that of the stiffness, too, as a part of its mean.
 
     Raises
     ------
@@ -377,6 +412,16 @@ def loaded_transmission_error(
     """
     load = load_of(pair, torque)
     phase = _phases(pair, points, slices, start, cycles)
+    if accuracy is not None:
+        return _accurate(
+            lambda n, count: _loaded_curve(pair, load, start + np.arange(n * int(cycles)) / n, count, cycles),
+            pair, accuracy, points, slices,
+        )  # fmt: skip
+    return _loaded_curve(pair, load, phase, slices, cycles)
+
+
+def _loaded_curve(pair: Mesh, load: float, phase: np.ndarray, slices: int | None, cycles: int) -> TransmissionError:
+    """Return the transmission error under a load (N m) at some phases."""
     mesh = StaticMesh(pair, slices)
     side, rb = mesh.turning, mesh.geometry.driven.base_radius
     lag = side * static_lag(pair, load)

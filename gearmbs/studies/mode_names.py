@@ -8,14 +8,17 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from gearmbs.drivetrain import Drivetrain, Housing, Mount, Shaft
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, Housing, Mount, Shaft
 from gearmbs.drivetrain.plants import loaded
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.mechanism import linear_modes
+from gearmbs.studies.mode_accuracy import accurate_modes
+from gearmbs.units import to_si
 
 if TYPE_CHECKING:
     from gearmbs.dae.analyses.modes import Modes
     from gearmbs.flexible import ModalModel
+    from gearmbs.units import QuantityLike
 
 KINDS = ("mesh", "shaft", "bearing", "coupling", "housing", "mount", "load", "other")
 """What parts are, in the order of tables; drives count as loads."""
@@ -26,7 +29,7 @@ MOTIONS = ("bending", "torsion", "stretching")
 RIGID = "rigid motion"
 
 
-def train_modes(train: Drivetrain) -> Modes:
+def train_modes(train: Drivetrain, *, accuracy: QuantityLike | None = None, below: QuantityLike | None = None) -> Modes:
     """Return the modes of a whole drivetrain about its position of rest under the operating torques.
 
     Tooth contacts have the stiffness of the pairs that touch there, and no friction. Shafts of prescribed speed are
@@ -36,6 +39,11 @@ def train_modes(train: Drivetrain) -> Modes:
     Parameters
     ----------
     train : Drivetrain
+    accuracy : float or str, optional
+        To what part of itself each frequency is to be known, such as "1 %" or 0.01. Modes and elements of shafts and
+        housings that deform are doubled until it is, and ``errors`` tells; see `gearmbs.studies.mode_accuracy`.
+    below : float or str, optional
+        Up to which frequency that is asked, Hz; default three times the highest mesh frequency.
 
     Returns
     -------
@@ -46,13 +54,26 @@ def train_modes(train: Drivetrain) -> Modes:
     ------
     ModelError
         If no position of rest is found.
+    DrivetrainError
+        For ``below`` without an accuracy.
 
     Warns
     -----
     UserWarning
-        Of meshes that are damped above critical: their modes do not oscillate.
+        Of meshes that are damped above critical: their modes do not oscillate; of an accuracy that is not reached.
     """
     warn_of_overdamped_meshes(train)
+    if accuracy is None:
+        if below is not None:
+            raise DrivetrainError(
+                f"below = {below!r}: it is where an accuracy ends; give accuracy, too, or leave it out"
+            )
+        return _modes(train)
+    limit = None if below is None else to_si(below, "frequency", "below")
+    return accurate_modes(_modes, train, accuracy, limit)
+
+
+def _modes(train: Drivetrain) -> Modes:
     m, after = loaded(train)
     return linear_modes(m, t=after)
 

@@ -20,10 +20,14 @@ from gearmbs.mechanism import Mechanism
 from gearmbs.schema.described import Described, check_keys, read_toml
 from gearmbs.schema.quantities import Measure
 from gearmbs.signals import fixed_sensor
+from gearmbs.signals.analysis.bands import MIN_PERIODS, harmonic_amplitudes
+from gearmbs.studies.case.limits import HARMONICS
 from gearmbs.studies.case.section import CaseError
 from gearmbs.studies.case.tooth_faults import tooth_fault
+from gearmbs.studies.run.accuracy import asked_accuracy
 from gearmbs.studies.run.recorder import TURN_BEFORE
-from gearmbs.units import Quantity, to_si
+from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines
+from gearmbs.units import Quantity, QuantityLike, to_si
 
 MEMBERS = ("sun", "carrier", "ring")
 OVERSAMPLING = 4
@@ -126,7 +130,9 @@ def planetary_run(data: Mapping[str, Any]) -> PlanetaryRun:
     return PlanetaryRun(gears, supports=supports, pins=pins, rim=rim, **operation)
 
 
-def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = None) -> xr.Dataset:
+def run_planetary(
+    run: PlanetaryRun, progress: Callable[[float], None] | None = None, *, accuracy: QuantityLike | None = None
+) -> xr.Dataset:
     """Simulate a planetary set and return its record.
 
     Parameters
@@ -134,6 +140,9 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
     run : PlanetaryRun
     progress : callable, optional
         Called with the simulated time, s.
+    accuracy : float or str, optional
+        How well the mesh harmonics are to be known, such as "1 %" or 0.01, as a part of the largest of their mesh.
+        Tolerance and slices of the faces are chosen for it; see `gearmbs.studies.train_accuracy`.
 
     Returns
     -------
@@ -141,12 +150,70 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
         Over ``time``: ``speed`` (member), ``force`` of the meshes with the sun and the ring (mesh, planet), ``share``
         of the load, ``ring_sensor``, the forces on the ring weighted by the planets' path past a sensor at angle 0,
         ``carrier_angle``, and with a rim that bends ``rim_velocity``, its radial velocity at angle 0.
-        Attributes hold the frequencies of `PlanetarySet.frequencies`.
+        Attributes hold the frequencies of `PlanetarySet.frequencies`. With an accuracy ``mesh_rms``, the RMS of the
+        first three mesh harmonics of each force, and ``mesh_rms_error``, their numerical errors, too.
 
     Raises
     ------
     RuntimeError
         If the integration does not reach its end.
+    CaseError
+        With an accuracy: if the run has a tolerance of its own, or half of its record is too short for harmonics.
+
+    Warns
+    -----
+    UserWarning
+        Of an accuracy that was not reached.
+    """
+    if accuracy is None:
+        return _run(run, progress)[0]
+    wanted, gears = asked_accuracy(accuracy), run.gears
+    if run.tolerance != PlanetaryRun.tolerance:
+        raise CaseError(
+            f"{gears.name}: accuracy = {accuracy!r}: the tolerance is chosen for it, but operation.tolerance is "
+            f"{run.tolerance:g}; leave one of the two out"
+        )
+    pairs = (gears.pairs_sun[0], gears.pairs_ring[0])
+    count = 1 if gears.ideal is not None else max(pair.face_slices for pair in pairs)
+    slices = {} if count == 1 else {"set": count}
+
+    def lines(precise: Precise) -> Lines:
+        sliced = precise.slices.get("set", count)
+        one = run if sliced == count else replace(run, gears=replace(gears, slices=sliced))
+        record, forces = _run(replace(one, tolerance=precise.tolerance), progress)
+        frequency = abs(record.attrs["frequency_mesh"])
+        half = forces.shape[0] // 2
+        rate = run.rate * OVERSAMPLING
+        if half * frequency < MIN_PERIODS * rate or not HARMONICS * frequency < 0.5 * rate:
+            raise CaseError(
+                f"{gears.name}: accuracy = {accuracy!r}: half of operation.duration = {run.duration:g} s has "
+                f"{half * frequency / rate:.3g} mesh cycles of {frequency:.4g} Hz; give a duration of "
+                f"{2.0 * (MIN_PERIODS + 1) / max(frequency, 1e-30):.3g} s or more, and a rate above "
+                f"{2.1 * HARMONICS * frequency / OVERSAMPLING:.6g} Hz"
+            )
+        orders = np.arange(1, HARMONICS + 1)
+
+        def levels(part: np.ndarray) -> np.ndarray:
+            return np.abs(harmonic_amplitudes(part, rate, frequency, orders)).T[:, None, :] / np.sqrt(2.0)
+
+        whole = levels(forces)
+        record["mesh_rms"] = (
+            ("mesh", "planet", "harmonic"),
+            whole.reshape(2, gears.planets, HARMONICS),
+            {"units": "N", "long_name": "RMS of the mesh harmonics of the forces of the teeth"},
+        )
+        record.coords["harmonic"] = orders
+        return Lines(record, whole, np.stack([levels(forces[:half]), levels(forces[half:])]))
+
+    groups = np.zeros(2 * gears.planets, dtype=int)
+    first = Precise(PlanetaryRun.tolerance, slices)
+    return accurate_lines(lines, first, wanted, groups, "mesh_rms", f"planetary set '{gears.name}'")
+
+
+def _run(run: PlanetaryRun, progress: Callable[[float], None] | None) -> tuple[xr.Dataset, np.ndarray]:
+    """Return the record of a planetary set, and the forces of its meshes, (m, 2 planets).
+
+    These are at `OVERSAMPLING` times its rate, those with the sun first.
     """
     from scipy.signal import resample_poly
 
@@ -179,6 +246,7 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
     turned = np.unwrap(told["carrier angle"])
     heard = fixed_sensor(both["ring"][fine], turned[fine], [float(a) for a in gears.angles or ()])
     heard = resample_poly(heard, 1, OVERSAMPLING, padtype="line")
+    at_meshes = np.concatenate([both["sun"][fine], both["ring"][fine]], axis=1)
     both = {mesh: force[kept] for mesh, force in both.items()}
     spin = {m: told[f"{m} speed"][kept] for m in MEMBERS}
     angle = turned[kept]
@@ -189,7 +257,7 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
     time = solution.t[first::OVERSAMPLING] - begin
     # what `analyse` can tell faults of
     plain = gears.planet_at_ring is None and run.held == "ring"
-    return xr.Dataset(
+    record = xr.Dataset(
         {
             "speed": (("time", "member"), np.column_stack([spin[m] for m in MEMBERS]), {"units": "rad/s"}),
             "force": (("time", "mesh", "planet"), np.stack([both["sun"], both["ring"]], axis=1), {"units": "N"}),
@@ -213,6 +281,7 @@ def run_planetary(run: PlanetaryRun, progress: Callable[[float], None] | None = 
             **{f"frequency_{name}": value for name, value in rates.items()},
         },
     )
+    return record, at_meshes
 
 
 def _rows_before(run: PlanetaryRun, t: np.ndarray) -> np.ndarray:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,48 +15,42 @@ import gearmbs
 from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.dae.result import Status
 from gearmbs.dae.results.solution import Solution
-from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError, Laser, RunSettings
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, RunSettings
 from gearmbs.drivetrain.description import Description, read_description
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, differentials
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.files import json_value
 from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.solve.accuracy import JOINED
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.signals import even_signal, make_signal
-from gearmbs.signals.analysis.bands import MIN_PERIODS, harmonic_amplitudes
+from gearmbs.signals.analysis.bands import MIN_PERIODS
 from gearmbs.signals.files.simulated import holds_speed, mesh_of_record, placed_lines, with_speed_of
 from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER, PRESETS
+from gearmbs.studies.run.accuracy import asked_accuracy
 from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
+from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines, settled_halves
 from gearmbs.studies.train_bearings import bearing_remarks
+from gearmbs.studies.train_levels import bearing_names, harmonic_levels, mesh_tracks
 from gearmbs.studies.train_record import (
     CONTACT,
-    TURN,
-    WHOLE,
-    HeldSpeed,
     TrainColumns,
     TrainRecorder,
-    by_angle,
-    carrier_turns,
     column_of,
-    driver_angle,
     held_speeds,
     on_shafts,
     recorded_table,
-    sidebands,
     speed_attributes,
     unresolved,
     warn_of_speeds,
 )
+from gearmbs.units import QuantityLike
 from gearmbs.wording import warn
 
 COUNTED = ("pairs_drive", "pairs_back")
-TRACK_MOMENTS = 60
-"""Moments of a run-up at which mesh harmonics are told."""
-TRACK_CYCLES = 16.0
-"""Mesh cycles in a window around each."""
 
 
 def load_train(path: str | Path) -> Description:
@@ -89,6 +82,7 @@ def run_train(
     *,
     mechanism: Mechanism | None = None,
     progress: bool | Callable[[float], None] | None = None,
+    accuracy: QuantityLike | None = None,
 ) -> xr.Dataset:
     """Simulate a drivetrain and return its record.
 
@@ -100,6 +94,10 @@ def run_train(
         What is simulated instead of ``train.build()``: that, with parts added or changed. Its ``lump`` decides whether
         shafts on fixed axes are integrated by their angles alone, which they are otherwise.
     progress : bool or callable, optional
+    accuracy : float or str, optional
+        How well the mesh harmonics are to be known, such as "1 %" or 0.01, as a part of the largest of their signal.
+        Tolerance and slices of the faces are chosen for it, and ``mesh_rms_error`` tells the numerical error of each
+        level, with what the two halves of the record differ by; see `gearmbs.studies.train_accuracy`.
 
     Returns
     -------
@@ -117,22 +115,99 @@ def run_train(
     Raises
     ------
     DrivetrainError
-        If the record is too short for its harmonics.
+        If the record is too short for its harmonics; with an accuracy, if its halves are, if the settings have a
+        tolerance of their own, or speeds follow curves.
     SimulationFailed
         If the integrator stops early; the exception carries the solution so far.
 
     Warns
     -----
     UserWarning
-        Of meshes that are damped above critical by their contact law, of drives that cannot carry the loads, and of
-        speeds that are not steady or far from the nominal ones, of meshes without force though a torque acts, as of a
-        shaft that has left its bearings, and of tapered roller and angular contact bearings that carry against their
-        sense.
+        Of an accuracy that was not reached, of meshes that are damped above critical by their contact law, of drives
+        that cannot carry the loads, of speeds that are not steady or far from the nominal ones, of meshes without force
+        though a torque acts, as of a shaft that has left its bearings, and of tapered roller and angular contact
+        bearings that carry against their sense.
     """
     run = run or RunSettings()
     warn_of_overdamped_meshes(train)
-    rate = run.output_rate(train)
+    if accuracy is not None:
+        return _accurate(train, run, mechanism, progress, accuracy)
     check_record(train, run)
+    known, solution = _simulated(train, run, mechanism, progress)
+    return evaluated(train, run, known, solution)
+
+
+def _accurate(
+    train: Drivetrain,
+    run: RunSettings,
+    mechanism: Mechanism | None,
+    progress: bool | Callable[[float], None] | None,
+    accuracy: QuantityLike,
+) -> xr.Dataset:
+    """Return a record whose mesh harmonics are as accurate as asked; see `run_train`."""
+    wanted = asked_accuracy(accuracy)
+    title = f"drivetrain '{train.name}'"
+    if run.tolerance != RunSettings().tolerance:
+        raise DrivetrainError(
+            f"{title}: accuracy = {accuracy!r}: the tolerance is chosen for it, but run.tolerance is "
+            f"{run.tolerance:g}; leave one of the two out"
+        )
+    if train.changes_speed:
+        raise DrivetrainError(
+            f"{title}: accuracy = {accuracy!r}: mesh harmonics along a run-up have no record that could be halved; "
+            "take a constant speed, or compare two tolerances"
+        )
+    try:
+        check_record(train, replace(run, duration=0.5 * run.duration))
+    except DrivetrainError as error:
+        raise DrivetrainError(f"{title}: accuracy = {accuracy!r} looks at the halves of the record: {error}") from None
+    check_record(train, run)
+    slices = {mesh.name: train.pairs[mesh.name].face_slices for mesh in train.meshings}
+    slices = {name: count for name, count in slices.items() if count > 1}
+    fixed = sorted(set(slices) - {mesh.name for mesh in train.meshes})
+    if fixed or (slices and mechanism is not None):
+        whose = ", ".join(fixed or slices)
+        raise DrivetrainError(
+            f"{title}: accuracy = {accuracy!r}: what the slices of the faces of {whose} are good for cannot be told, "
+            "for they are not changed here; take wheels whose flanks do not vary along the face, or compare two numbers"
+        )
+
+    def lines(precise: Precise) -> Lines:
+        one = train
+        for name, count in precise.slices.items():
+            if count != slices[name]:
+                one = one.changed(name, settings={"slices": count})
+        settings = replace(run, tolerance=precise.tolerance)
+        known, solution = _simulated(one, settings, mechanism, progress)
+        record = evaluated(one, settings, known, solution)
+        halves = settled_halves(
+            lambda settling, duration: _levels(one, replace(settings, settling=settling, duration=duration), known),
+            run.settling, run.duration,
+        )  # fmt: skip
+        return Lines(record, record["mesh_rms"].values, np.stack(halves))
+
+    names = len(train.meshings) + 3 * (len(train.bearings) + len(train.pins))
+    groups = np.concatenate([np.zeros(names, dtype=int), 1 + np.arange(len(train.sensors))])
+    return accurate_lines(lines, Precise(JOINED, slices), wanted, groups, "mesh_rms", title)
+
+
+def _levels(train: Drivetrain, run: RunSettings, known: TrainColumns) -> np.ndarray:
+    """Return the mesh harmonics of a part of what was measured, (signals, meshes, harmonics)."""
+    out = _even_record(train, run, known)
+    start = train.run_up + run.settling
+    return harmonic_levels(
+        train, run, out, run.output_rate(train), known, start, start + run.duration, held_speeds(train, out)
+    ).values
+
+
+def _simulated(
+    train: Drivetrain,
+    run: RunSettings,
+    mechanism: Mechanism | None,
+    progress: bool | Callable[[float], None] | None,
+) -> tuple[TrainColumns, Solution]:
+    """Return what was measured of a drivetrain at the integrator's own steps."""
+    rate = run.output_rate(train)
     begin = train.run_up + run.settling
     ahead = (MARGIN + 4) / rate
     if mechanism is None:
@@ -150,7 +225,7 @@ def run_train(
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
         partial = None if recorder.is_empty else raw_record(train, recorder.joined(), solution)
         raise kind(f"drivetrain '{train.name}': {solution.message}", solution, None, partial)
-    return evaluated(train, run, recorder.joined(), solution)
+    return recorder.joined(), solution
 
 
 def run_trains(
@@ -158,6 +233,7 @@ def run_trains(
     *,
     workers: int | None = None,
     progress: bool | Callable[[str, float], None] | None = None,
+    accuracy: QuantityLike | None = None,
 ) -> dict[str, xr.Dataset]:
     """Simulate drivetrains side by side and return their records by name.
 
@@ -168,6 +244,8 @@ def run_trains(
         Runs at a time; default the cores, and one if an integrator holds the interpreter.
     progress : bool or callable, optional
         Bars, see `gearmbs.progress`; a callable is told ``progress(name, fraction)`` from time to time.
+    accuracy : float or str, optional
+        As of `run_train`.
 
     Raises
     ------
@@ -178,7 +256,7 @@ def run_trains(
     def work(name: str, report: Callable[[float], None]) -> xr.Dataset:
         train, run = runs[name]
         span = train.run_up + run.settling + run.duration
-        return run_train(train, run, progress=lambda t: report(min(t / span, 1.0)))
+        return run_train(train, run, progress=lambda t: report(min(t / span, 1.0)), accuracy=accuracy)
 
     compiled = all(INTEGRATORS[run.integrator].compiled for _, run in runs.values())
     return run_named(work, list(runs), workers=workers if compiled else 1, progress=progress)
@@ -256,8 +334,8 @@ def _twists(train: Drivetrain, twisted: np.ndarray) -> Callable[[Meshing, str], 
     return twist
 
 
-def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution: Solution) -> xr.Dataset:
-    """Return the record of what was measured at the integrator's own steps; see `run_train`."""
+def _even_record(train: Drivetrain, run: RunSettings, known: TrainColumns) -> xr.Dataset:
+    """Return the variables of a record over time, from what was measured at the integrator's own steps."""
     rate = run.output_rate(train)
     start = train.run_up + run.settling
     stop = start + run.duration
@@ -280,7 +358,15 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
     error = _interpolated(known.t, error, t)
     speed = _interpolated(known.t, known.speed, t)
     bearing = values[:, meshes : meshes + 3 * bearings].reshape(t.size, bearings, 3)
-    out = _dataset(train, t, contact, bearing, values[:, meshes + 3 * bearings :], speed, error)
+    return _dataset(train, t, contact, bearing, values[:, meshes + 3 * bearings :], speed, error)
+
+
+def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution: Solution) -> xr.Dataset:
+    """Return the record of what was measured at the integrator's own steps; see `run_train`."""
+    rate = run.output_rate(train)
+    start = train.run_up + run.settling
+    stop = start + run.duration
+    out = _even_record(train, run, known)
     of_bearings = bearing_remarks(train, out)
     for remark in of_bearings:
         warn(f"drivetrain '{train.name}': {remark}")
@@ -289,7 +375,7 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
         out.attrs = attributes(train, run, solution)
         return out
     held = held_speeds(train, out)
-    out["mesh_rms"] = _harmonics(train, run, out, rate, known, start, stop, held)
+    out["mesh_rms"] = harmonic_levels(train, run, out, rate, known, start, stop, held)
     out.attrs = attributes(train, run, solution) | speed_attributes(
         held, [*unresolved(train, known, start, stop), *of_bearings]
     )
@@ -305,137 +391,6 @@ def _interpolated(t: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarr
     out = np.empty((at.size, values.shape[1]))
     for k in range(values.shape[1]):
         out[:, k] = monotone_cubic(t, np.ascontiguousarray(values[:, k]), at)
-    return out
-
-
-def _bearing_names(train: Drivetrain) -> list[str]:
-    """Return the names of all bearings, the pins of planets behind the others."""
-    return [*(bearing.name for bearing in train.bearings), *train.pins]
-
-
-def _signals(train: Drivetrain, record: xr.Dataset) -> tuple[list[str], np.ndarray]:
-    """Return names and values, shape (m, signals), of all that mesh harmonics are told of."""
-    names = [f"force of {m.name}" for m in train.meshings]
-    columns = [record["normal_force"].values]
-    for k, bearing in enumerate(_bearing_names(train)):
-        names += [f"{bearing} {axis}" for axis in "xyz"]
-        columns.append(record["bearing_force"].values[:, k])
-    names += [s.name for s in train.sensors]
-    columns.append(record["measured"].values)
-    return names, np.concatenate(columns, axis=1)
-
-
-def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: TrainColumns) -> xr.DataArray:
-    """Return the RMS of each signal at the harmonics of each mesh along a run-up or coast-down.
-
-    Returns
-    -------
-    DataArray
-        Dims (signal, mesh, harmonic, moment); ``track_time`` (s), ``track_speed`` (of the first drive's shaft, rad/s)
-        and, by mesh, ``track_frequency`` (Hz) of each moment. A moment is the middle of a window of some mesh cycles,
-        see `gearmbs.signals.order_track`; NaN where a mesh does not turn enough for one.
-    """
-    from gearmbs.signals import SignalError, order_track
-
-    names, signals = _signals(train, record)
-    t = record["time"].values
-    moments = np.linspace(t[0], t[-1], TRACK_MOMENTS + 2)[1:-1]
-    orders = np.arange(1, run.harmonics + 1)
-    rms = np.full((len(names), len(train.meshings), run.harmonics, moments.size), np.nan)
-    frequency = np.zeros((len(train.meshings), moments.size))
-    shafts = list(train.turning)
-    for k, mesh in enumerate(train.meshings):
-        teeth, turned = mesh.gears[0].teeth, driver_angle(train, known, mesh)
-        # the angle in mesh cycles: an order is then a harmonic of the mesh
-        angle = xr.DataArray(teeth * np.abs(np.interp(t, known.t, turned)), dims="time",
-                             coords={"time": t}, attrs={"units": "rad"})  # fmt: skip
-        speed = driver_angle(train, known, mesh, of_speed=True)
-        frequency[k] = teeth * np.abs(np.interp(moments, known.t, speed)) / (2.0 * np.pi)
-        signal = make_signal(signals, float(run.output_rate(train)), units="1", channels=names, t0=float(t[0]))
-        try:
-            found = order_track(signal, orders=orders.tolist(), phase=angle, scaling="rms", revolutions=TRACK_CYCLES)
-        except SignalError:
-            continue
-        at = found["time"].values
-        inside = (moments >= at[0]) & (moments <= at[-1])
-        for h in range(run.harmonics):
-            for n in range(len(names)):
-                rms[n, k, h, inside] = np.interp(moments[inside], at, found.values[:, h, n])
-    return xr.DataArray(
-        rms, dims=("signal", "mesh", "harmonic", "moment"),
-        coords={"signal": names, "mesh": [m.name for m in train.meshings], "harmonic": orders,
-                "track_time": ("moment", moments, {"units": "s"}),
-                "track_speed": ("moment", np.abs(np.interp(moments, known.t, known.speed[:, shafts.index(
-                    train.drives[0].shaft)])), {"units": "rad/s"}),
-                "track_frequency": (("mesh", "moment"), frequency, {"units": "Hz"})},
-        attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
-    )  # fmt: skip
-
-
-def _harmonics(
-    train: Drivetrain, run: RunSettings, record: xr.Dataset, rate: float, known: TrainColumns, start: float,
-    stop: float, held: dict[str, HeldSpeed],
-) -> xr.DataArray:  # fmt: skip
-    """Return the RMS of each signal at the harmonics of each mesh, at the mean speed of the record."""
-    names, signals = _signals(train, record)
-    rms = np.full((len(names), len(train.meshings), run.harmonics), np.nan)
-    frequency = np.zeros(len(train.meshings))
-    groups: dict[str, int] = {}
-    standing = {f"{bearing.name} {axis}" for bearing in train.bearings for axis in "xyz"}
-    standing |= {sensor.name for sensor in train.sensors if isinstance(sensor, Laser | Accelerometer)}
-    stands = np.array([name in standing for name in names], dtype=bool)
-    for k, mesh in enumerate(train.meshings):
-        if (same := groups.setdefault(mesh.group, k)) != k:
-            # all planets of a stage mesh at one frequency
-            rms[:, k], frequency[k] = rms[:, same], frequency[same]
-            continue
-        teeth, whole = mesh.gears[0].teeth, driver_angle(train, known, mesh)
-        turned = np.interp([start, stop], known.t, whole)
-        frequency[k] = teeth * abs(turned[1] - turned[0]) / (2.0 * np.pi * (stop - start))
-        orders = np.arange(1, run.harmonics + 1)
-        if not held[mesh.name].is_steady:
-            continue
-        if frequency[k] * (stop - start) >= MIN_PERIODS and orders[-1] * frequency[k] < 0.5 * rate:
-            seen, samples, fundamental = signals, rate, float(frequency[k])
-            if held[mesh.name].smears(fundamental * (stop - start) * orders[-1]):
-                angle = np.interp(record["time"].values, known.t, whole)
-                seen, samples, fundamental = by_angle(signals, teeth * np.abs(angle - angle[0]) / TURN)
-            rms[:, k] = np.abs(harmonic_amplitudes(seen, samples, fundamental, orders)).T / np.sqrt(2.0)
-            turns = carrier_turns(train, known, mesh, start, stop)
-            if turns is not None:
-                # cycles of the mesh in a turn of the carrier
-                cycles = frequency[k] * (stop - start) / max(turns, 1.0) if turns >= WHOLE else math.nan
-                planets = train.part(mesh.stage, PlanetaryStage).gears.planets
-                rms[stands, k] = _with_sidebands(seen[:, stands], samples, fundamental, cycles, orders, planets)
-    return xr.DataArray(
-        rms, dims=("signal", "mesh", "harmonic"),
-        coords={"signal": names, "mesh": [m.name for m in train.meshings], "harmonic": np.arange(1, run.harmonics + 1),
-                "mesh_frequency": ("mesh", frequency, {"units": "Hz"}),
-                "nominal_frequency": ("mesh", [train.kinematics.mesh_frequency(m.name) for m in train.meshings],
-                                      {"units": "Hz"})},
-        attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
-    )  # fmt: skip
-
-
-def _with_sidebands(
-    values: np.ndarray, rate: float, fundamental: float, cycles: float, orders: np.ndarray, planets: int
-) -> np.ndarray:
-    """Return the RMS of mesh harmonics with their `sidebands`, (signals, orders), over whole turns of the carrier.
-
-    Parameters
-    ----------
-    cycles : float
-        Of the mesh in a turn of the carrier; NaN where the record has no whole turn, whose lines it cannot part.
-    """
-    out = np.full((values.shape[1], orders.size), np.nan)
-    if not math.isfinite(cycles):
-        return out
-    turn = fundamental / cycles
-    for n, order in enumerate(orders):
-        lines = order * cycles + sidebands(planets)
-        lines = lines[(lines > 0.0) & (lines * turn < 0.5 * rate)]
-        found = harmonic_amplitudes(values, rate, turn, lines, least=1)
-        out[:, n] = np.sqrt(0.5 * np.sum(np.abs(found) ** 2, axis=0))
     return out
 
 
@@ -460,7 +415,7 @@ def _dataset(
     coords = {
         "time": ("time", t, {"units": "s"}),
         "mesh": [m.name for m in train.meshings],
-        "bearing": _bearing_names(train),
+        "bearing": bearing_names(train),
         "xyz": ["x", "y", "z"],
         "sensor": [s.name for s in train.sensors],
         "shaft": list(train.turning),

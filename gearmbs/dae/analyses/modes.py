@@ -68,6 +68,9 @@ class Modes:
     body_names : list of str
     parts : ModeParts, optional
         Where the energy of each is, and what damps it.
+    errors : ndarray, shape (k,), optional
+        Numerical errors of the frequencies, Hz, where an accuracy was asked for, as of `gearmbs.studies.train_modes`;
+        NaN of those that were not judged.
     """
 
     eigenvalues: np.ndarray
@@ -77,6 +80,7 @@ class Modes:
     shapes: np.ndarray
     body_names: list[str]
     parts: ModeParts | None = None
+    errors: np.ndarray | None = None
 
     @property
     def stable(self) -> bool:

@@ -279,11 +279,11 @@ def _told(record: xr.Dataset, wanted: float, worst: float, fine: Case, coarse: C
     sliced = f" and {slices[0]} slices of the face" if slices[0] > 1 else ""
     against = f" and {slices[1]}" if slices[0] > 1 else ""
     said = (
-        f"mesh harmonics are known to {_per_cent(worst)} of the largest of their component, by runs at tolerances of "
+        f"mesh harmonics are known to {per_cent(worst)} of the largest of their component, by runs at tolerances of "
         f"{fine.tolerance:.2g}{sliced}, and of {coarse.tolerance:.2g}{against}"
     )
     if worst > wanted:
-        said += f"; {_per_cent(wanted)} was asked for"
+        said += f"; {per_cent(wanted)} was asked for"
         if record.attrs.get("record_status", "periodic") != "periodic":
             said += ", but the motion does not repeat itself: a longer duration averages more of it"
     apart = record.attrs.get("record_apart", 0.0)
@@ -299,5 +299,5 @@ def _told(record: xr.Dataset, wanted: float, worst: float, fine: Case, coarse: C
     return record
 
 
-def _per_cent(part: float) -> str:
+def per_cent(part: float) -> str:
     return f"{100.0 * part:.2g} %"
