@@ -58,7 +58,7 @@ MAY_KNOW = {
         "view",
     },
     "campaigns": {"adams", "bearings", "drivetrain", "signals", "studies", "view"},
-    "identify": {"signals", "studies"},
+    "identify": {"dae", "drivetrain", "mechanism", "signals", "studies"},
     "cli": {"adams", "campaigns", "identify", "signals", "studies"},
 }
 """What a package may import, besides itself, ``kernels`` and what `SUPPORT` names. ``dae`` alone is what integrators
@@ -93,6 +93,7 @@ EXCEPTIONS = {
     ("native", "gearmbs"): "an FMU says which version made it",
     ("campaigns", "gearmbs"): "the card of a data set says which version made it",
     ("cli", "gearmbs"): "the version",
+    ("identify", "dae.results"): "what a result is asked of, the type alone",
 }
 """Further arrows, and why."""
 

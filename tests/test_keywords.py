@@ -135,7 +135,7 @@ HELD = {
     ),
     "signals, meshes": (MeshKeywords, taken(gmf_rms, "signal", "harmonics", "half_width")),
     "signals, pulses": (TrainKeywords, taken(pulse_train, "times", "lines", "index")),
-    "identify, fits": (FitKeywords, taken(fit, "model", "measured", "free", "sigma", "many", "lost")),
+    "identify, fits": (FitKeywords, taken(fit, "model", "measured", "free", "sigma", "many", "jacobian", "lost")),
     "identify, problems": (ProblemKeywords, taken(CaseProblem, "measured", "cases", "free")),
     "studies, rigs": (RigKeywords, taken(gear_rig, "pair")),
     "drivetrain": (DrivetrainKeywords, taken(Drivetrain)),

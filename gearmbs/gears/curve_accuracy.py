@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,9 @@ from gearmbs.wording import warn
 
 if TYPE_CHECKING:
     from gearmbs.gears.mesh import Mesh
-    from gearmbs.gears.transmission import TransmissionError
+
+Curve = TypeVar("Curve", bound=Any)
+"""A `gearmbs.gears.transmission.TransmissionError`, of the functions there."""
 
 SMALLEST, LARGEST = 1e-6, 0.5
 """Accuracies that can be asked for: angles are found to 1e-12 of the load, differences of curves to 1e-6 of them."""
@@ -34,6 +36,8 @@ MOST_POINTS = 12_800
 """Points of a cycle at most: a path of contact of 20 mm in steps of a micrometre and a half."""
 COUNT = 5
 """Harmonics that are judged."""
+NOTHING = 1e-11
+"""Peak to peak below which a curve is a straight line, m: angles are found to 1e-15 m at the base circle."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +97,8 @@ def asked_part(accuracy: QuantityLike) -> float:
 
 
 def accurate_curve(
-    curve: Callable[[int, int], TransmissionError], pair: Mesh, accuracy: QuantityLike, points: int, slices: int | None
-) -> TransmissionError:
+    curve: Callable[[int, int], Curve], pair: Mesh, accuracy: QuantityLike, points: int, slices: int | None
+) -> Curve:
     """Return a curve whose mean, extremes, harmonics and mean stiffness are as accurate as asked.
 
     Parameters
@@ -130,10 +134,11 @@ def accurate_curve(
         )
     if points % 2:
         raise ValueError(
-            f"accuracy = {accuracy!r} holds both halves of the points against each other; give an even number"
+            f"points is {points}: accuracy = {accuracy!r} holds even and odd points against each other; give an even "
+            "number"
         )
     count = sliced if given is None else given
-    coarse: tuple[int, TransmissionError] | None = None
+    coarse: tuple[int, Any] | None = None
     for attempt in range(ATTEMPTS):
         found = curve(points, count)
         by_slices = np.zeros(4)
@@ -166,12 +171,12 @@ def _slices(pair: Mesh) -> int:
     return int(pack(pair, None)[0][layout.SLICES])
 
 
-def _numbers(found: TransmissionError) -> np.ndarray:
+def _numbers(found: Any) -> np.ndarray:
     """Return mean, peak to peak, and mean stiffness of a curve; harmonics are held apart."""
     return np.array([found.mean, found.peak_to_peak, float(found.stiffness.mean())])
 
 
-def _by_slices(found: TransmissionError, count: int, other: TransmissionError, fewer: int) -> np.ndarray:
+def _by_slices(found: Any, count: int, other: Any, fewer: int) -> np.ndarray:
     """Return the errors of mean, peak to peak, harmonics and stiffness by the slices."""
     ratio = fewer / count
     share = max(SHARE, ratio**2 / (1.0 - ratio**2))
@@ -183,7 +188,7 @@ def _by_slices(found: TransmissionError, count: int, other: TransmissionError, f
     return share * np.array([max(mean, 0.5 * shape), max(peaks, 0.5 * shape), max(lines, 0.1 * shape), stiffness])
 
 
-def _by_points(found: TransmissionError) -> np.ndarray:
+def _by_points(found: Any) -> np.ndarray:
     """Return the same by the points of a cycle."""
     parts = [
         replace(found, error=found.error[k::2], stiffness=found.stiffness[k::2], extremes=found.extremes)
@@ -195,10 +200,11 @@ def _by_points(found: TransmissionError) -> np.ndarray:
         peaks = max(found.peak_to_peak - min(part.peak_to_peak for part in parts), _beyond(found.error))
     lines = max(float(np.abs(found.harmonics(COUNT) - part.harmonics(COUNT)).max()) for part in parts)
     # each half is off from the whole by half of what they differ by, and the whole by less than that; where a jump, or
-    # steep flank, lies between two points both may agree by chance: the sum is off by up to half of it over a step
+    # steep flank, lies between two points both may agree by chance: of a rise and a fall the sum is off by up to half a
+    # step of each
     steps = found.phase.size
-    steep, jump = (0.5 * float(np.abs(np.diff(v)).max(initial=0.0)) / steps for v in (found.error, found.stiffness))
-    return np.array([max(0.5 * mean, steep), peaks, max(SHARE * lines, 2.0 * steep), max(0.5 * stiffness, jump)])
+    steep, jump = (float(np.abs(np.diff(v)).max(initial=0.0)) / steps for v in (found.error, found.stiffness))
+    return np.array([max(0.5 * mean, steep), peaks, max(SHARE * lines, steep), max(0.5 * stiffness, jump)])
 
 
 def _beyond(error: np.ndarray) -> float:
@@ -214,14 +220,14 @@ def _beyond(error: np.ndarray) -> float:
     return total
 
 
-def _units(found: TransmissionError) -> np.ndarray:
+def _units(found: Any) -> np.ndarray:
     """Return of what errors are parts."""
-    peaks = max(found.peak_to_peak, np.finfo(float).tiny)
+    peaks = max(found.peak_to_peak, NOTHING)
     return np.array([peaks, peaks, peaks, max(float(found.stiffness.mean()), np.finfo(float).tiny)])
 
 
 def _judged(
-    found: TransmissionError, by_slices: np.ndarray, by_points: np.ndarray, wanted: float, points: int, count: int
+    found: Any, by_slices: np.ndarray, by_points: np.ndarray, wanted: float, points: int, count: int
 ) -> CurveErrors:
     """Return what a curve is known to."""
     whole = np.hypot(by_slices, by_points)

@@ -88,15 +88,15 @@ def test_an_oscillator_from_a_signal_with_profiles_beside_intervals():
 
 def test_what_is_missing_is_named():
     table = pd.DataFrame([("a", "x", 1, 1.0, 0.02), ("a", "x", 2, 1.0, 0.02)], columns=COLUMNS)
-    with pytest.raises(IdentifyError, match=says("channel x", "y", "what it measures")):
+    with pytest.raises(IdentifyError, match=says("results", "channel x", "y")):
         MotionProblem(table, shaken, FREE, {"y": "DX(I,J)"}, period=np.pi)
-    with pytest.raises(IdentifyError, match=says("no model", "a", "b")):
+    with pytest.raises(IdentifyError, match=says("measured", "a", "b")):
         MotionProblem(table, {"b": shaken}, FREE, {"x": "DX(I,J)"}, period=np.pi)
-    with pytest.raises(IdentifyError, match=says("period", "a")):
+    with pytest.raises(IdentifyError, match=says("model of case 'a'", "period")):
         MotionProblem(table, shaken, FREE, {"x": "DX(I,J)"}).fit()
     with pytest.raises(IdentifyError, match=says("frequency", "0.5", "whole number")):
         MotionProblem(table, shaken, FREE, {"x": "DX(I,J)"}, period=np.pi, frequency=0.5).fit()
-    with pytest.raises(IdentifyError, match=says("also")):
+    with pytest.raises(IdentifyError, match=says("free", "also", "stiffness")):
         MotionProblem(table, shaken, [Free("stiffness", 7.0, also={"damping": 1.0})], {"x": "DX(I,J)"})
 
 
