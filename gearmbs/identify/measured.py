@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from gearmbs.signals.analysis.bands import MeshKeywords
     from gearmbs.studies import Case
 
-SECTIONS = ("recording", "case", "free", "measured", "gains", "channels", "starts", "workers", "experiment")
+SECTIONS = (
+    "recording", "case", "free", "measured", "gains", "channels", "starts", "workers", "experiment", "derivatives_by",
+    "store",
+)  # fmt: skip
 LEVELS = ("harmonics", "way", "sections", "floor")
 FORMS: tuple[tuple[str, type, type], ...] = (
     ("recording", dict, str), ("case", dict, dict), ("free", list, dict), ("measured", dict, object),
@@ -117,8 +120,9 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
     under
     ``[case.all]``; ``[measured]`` says how recordings are read and cut; each ``[[free]]`` is a parameter;
     ``channels`` says which
-    component of the force stands for which channel; ``[experiment.NAME]`` may list changes of the first case for
-    `rank_experiments`. A recording may be a CSV table of harmonics, too.
+    component of the force stands for which channel; ``store`` names a folder beside the file, ``derivatives_by`` is as
+    of `CaseProblem`; ``[experiment.NAME]`` may list changes of the first case for `rank_experiments`. A recording may
+    be a CSV table of harmonics, too.
 
     Raises
     ------
@@ -146,6 +150,8 @@ def load_problem(path: str | Path) -> tuple[CaseProblem, dict[str, Any]]:
         channels=tree.get("channels"),
         way=way,
         workers=_whole(tree.get("workers", 1), "workers"),
+        derivatives_by=tree.get("derivatives_by", "steady"),
+        store=None if "store" not in tree else path.parent / str(tree["store"]),
     )
     return problem, {"starts": _whole(tree.get("starts", 1), "starts"), "experiments": tree.get("experiment")}
 

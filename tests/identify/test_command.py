@@ -13,6 +13,7 @@ from gearmbs.studies import Case, run_case
 
 FIT = """
 gains = "channel"
+store = "done"
 channels = { line_of_action = "line_of_action", line_of_centres = "line_of_centres" }
 
 [recording]
@@ -65,6 +66,7 @@ def test_from_recordings_to_a_report(tmp_path):
     line = next(row for row in text.partition("# Fit")[2].splitlines() if row.startswith("| friction.dynamic"))
     np.testing.assert_allclose(float(line.split("|")[2]), 0.06, rtol=0.01)
     assert "every parameter is determined" in text
+    assert list((tmp_path / "done").glob("*.json"))
 
 
 def test_wrong_files_are_named(tmp_path):
