@@ -42,6 +42,7 @@ def response(number):
     return force / abs(STIFFNESS - w * w + 1j * DAMPING * w)
 
 
+@pytest.mark.slow
 def test_an_oscillator_from_two_harmonics_of_two_channels():
     rows = [("a", c, k, response(k) * (2.0 * k) ** (c == "v") / 2**0.5, 0.01) for c in "xv" for k in (1, 2)]
     table = pd.DataFrame(rows, columns=COLUMNS)
@@ -53,6 +54,7 @@ def test_an_oscillator_from_two_harmonics_of_two_channels():
     assert not found.notes
 
 
+@pytest.mark.slow
 def test_lines_of_a_spectrum_over_orders_are_harmonics():
     lines = np.zeros((81, 1))
     lines[[40, 80], 0] = response(1), response(2)
@@ -70,6 +72,7 @@ def test_lines_of_a_spectrum_over_orders_are_harmonics():
             order_table({"a": spectrum}, [29.0, 80.0], **settings)
 
 
+@pytest.mark.slow
 def test_an_oscillator_from_a_signal_with_profiles_beside_intervals():
     rate, t = 20.0, np.arange(100) / 20.0
     w = np.sqrt(STIFFNESS - DAMPING**2 / 4.0)
@@ -86,6 +89,7 @@ def test_an_oscillator_from_a_signal_with_profiles_beside_intervals():
     assert table.loc["damping", "profile_low"] == pytest.approx(linear[0], rel=5e-3)
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_named():
     table = pd.DataFrame([("a", "x", 1, 1.0, 0.02), ("a", "x", 2, 1.0, 0.02)], columns=COLUMNS)
     with pytest.raises(IdentifyError, match=says("results", "channel x", "y")):

@@ -77,6 +77,7 @@ def test_harmonics_of_a_drivetrain_are_within_their_errors():
     assert float(known["mesh_rms_error"].sel(signal="force of mesh").max()) < 0.005 * float(largest)
 
 
+@pytest.mark.slow
 def test_what_a_train_cannot_be_asked_is_named():
     made = train(DRIVE)
     with pytest.raises(DrivetrainError, match=says("run.tolerance", "1e-09", "leave one")):
