@@ -42,7 +42,7 @@ def jobs() -> dict[str, tuple[Callable[[], object], float]]:
         "pair, run_case": (lambda: run_case(healthy, False), operation.run_up + operation.settling + SPAN),
         "three planets, run_planetary": (lambda: run_planetary(run), run.run_up + run.settling + SPAN),
         "pair, simulate": (lambda: simulated(case_mechanism(healthy), tight), SPAN),
-        "three planets, simulate": (lambda: simulated(planets, run.tolerance), SPAN),
+        "three planets, simulate": (lambda: simulated(planets, run.used_tolerance), SPAN),
         "three planets, simulate, tolerance of the pair": (lambda: simulated(planets, tight), SPAN),
     }
 

@@ -29,7 +29,7 @@ def described_model(path: Path) -> tuple[Mechanism, float, dict[str, Any]]:
         from gearmbs.studies.planetary import load_planetary
 
         found = load_planetary(path)
-        return found.mechanism(), found.run_up + found.settling + found.duration, {"tol": found.tolerance}
+        return found.mechanism(), found.run_up + found.settling + found.duration, {"tol": found.used_tolerance}
     if kind == "drivetrain":
         from gearmbs.studies.trains import load_train
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numba import float64, int64, void
 
-from gearmbs.dae.equations.rotation import matrix_of
+from gearmbs.dae.equations.rotation import matrix_of, put_turns
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import LANES
 
 SUM, INSIDE, ABOUT_AXIS, EULER = range(4)
 """Kinds of readers: multiples of unknowns, see `_sum`; `_inside`; `_about_axis`; `_euler`."""
@@ -18,12 +19,14 @@ SUM, INSIDE, ABOUT_AXIS, EULER = range(4)
 
 @njit(cache=True, error_model="numpy")
 def _sum(y, places, numbers, out):
-    """Add numbers times unknowns: places are the component and the unknown of each term."""
+    """Add numbers times unknowns: places are the component and the unknown of each term.
+
+    Step by step: what is read of one stands together in memory, and the steps far apart.
+    """
     out[:] = 0.0
-    for term in range(numbers.size):
-        component, unknown, factor = places[2 * term], places[2 * term + 1], numbers[term]
-        for k in range(y.shape[0]):
-            out[component, k] += factor * y[k, unknown]
+    for k in range(y.shape[0]):
+        for term in range(numbers.size):
+            out[places[2 * term], k] += numbers[term] * y[k, places[2 * term + 1]]
 
 
 @njit(cache=True, error_model="numpy")
@@ -60,14 +63,22 @@ def _about_axis(y, left, places, numbers, out):
 
 @njit(cache=True, error_model="numpy")
 def _euler(y, places, out):
-    """Write the matrix of the three angles from unknown ``places[0]`` on, whose reference code is ``places[1]``."""
-    first, code, matrix = places[0], places[1], np.empty(9)
-    for k in range(y.shape[0]):
-        psi, theta, phi = y[k, first], y[k, first + 1], y[k, first + 2]
-        turns = (np.cos(psi), np.sin(psi)), (np.cos(theta), np.sin(theta)), (np.cos(phi), np.sin(phi))
-        matrix_of(turns[0], turns[1], turns[2], code, matrix, 0)
-        for e in range(9):
-            out[e, k] = matrix[e]
+    """Write the matrix of the three angles from unknown ``places[0]`` on, whose reference code is ``places[1]``.
+
+    Sines and cosines of two steps are found at a time.
+    """
+    first, code, last = places[0], places[1], y.shape[0] - 1
+    angles, turned, matrix = np.empty(6), np.empty(2 * LANES), np.empty(9)
+    for k in range(0, y.shape[0], 2):
+        for c in range(3):
+            angles[c], angles[3 + c] = y[k, first + c], y[min(k + 1, last), first + c]
+        put_turns(angles, 0, 3, turned)
+        for step in range(k, min(k + 2, y.shape[0])):
+            at = 3 * (step - k)
+            psi, theta = (turned[LANES + at], turned[at]), (turned[LANES + at + 1], turned[at + 1])
+            matrix_of(psi, theta, (turned[LANES + at + 2], turned[at + 2]), code, matrix, 0)
+            for e in range(9):
+                out[e, step] = matrix[e]
 
 
 @njit(

@@ -441,6 +441,8 @@ class Solution(Measured, Shown):
 
     def angular_velocity(self, body: str) -> np.ndarray:
         """Return the angular velocity, global components, shape (m, 3), rad/s."""
+        if ("angular_velocity", body) in self.at_steps:
+            return self.at_steps["angular_velocity", body]
         return self._pose[:, self._body(body), POSE_W:POSE_COLUMNS]
 
     def com_acceleration(self, body: str) -> np.ndarray:

@@ -35,8 +35,9 @@ if TYPE_CHECKING:
     from gearmbs.dae.model.members import Members
     from gearmbs.dae.model.system import System
 
-MOST = 64
-"""Numbers watched at most, half a kilobyte a step: copying more would cost what it saves."""
+MOST = 128
+"""Numbers watched at most, a kilobyte a step: what eight meshes of planets tell with room for as many. Copying it takes
+a hundredth of such a step; forces of groups about fixed axes want many times more, which would cost what it saves."""
 
 BALANCED = 1e-12
 """Distance of a centre of mass from its axis, m, that is rounding: at 1000 rad/s it moves a kilogram by 1e-6 N."""
@@ -105,6 +106,7 @@ class Watch:
         kinds = {
             "reaction_force": self._reaction_force,
             "orientation": self._orientation,
+            "angular_velocity": self._angular_velocity,
             "diagnostics": self._diagnostics,
         }
         known = problem.index_one is None or not problem.index_one.any()
@@ -158,22 +160,73 @@ class Watch:
         if name not in self.system.model.names.bodies:
             return None
         number = self.system.model.names.bodies.index(name)
+        body, placed = self._moved_with(number)
+        if body == 0:
+            return lambda steps: np.tile(placed, (len(steps.y), 1, 1))
         if self.turns:
             return self._orientation_about_axis(number)
-        if self.members is not None:
-            return None
-        row = T.rows_in(self.idata, int(self.idata[T.H_I_AT]), int(self.idata[T.H_BODIES]), T.AT_COLUMNS)[number + 1]
+        row = self._places_of(body)
         if row[T.AT_ANGLES] != 3:
             return None
-        first, place = int(row[T.AT_THETA]), int(self.idata[T.H_I_CODE]) + number + 1
+        first, place = int(row[T.AT_THETA]), int(self.idata[T.H_I_CODE]) + body
+        alone = np.array_equal(placed, np.eye(3))
 
         def reader(steps: Steps) -> np.ndarray:
             places = np.array([first, steps.idata[place]], dtype=np.int64)
-            return _read(readers.EULER, steps, places, np.empty(0), 9).reshape(-1, 3, 3)
+            found = _read(readers.EULER, steps, places, np.empty(0), 9).reshape(-1, 3, 3)
+            return found if alone else found @ placed
 
         return reader
 
-    def _orientation_about_axis(self, number: int) -> Reader | None:
+    def _moved_with(self, number: int) -> tuple[int, np.ndarray]:
+        """Return the row of the integrated body that a body moves with, 0 if at rest, and its axes in that one's."""
+        from gearmbs.dae.model.members import PLACE_A, PLACE_MASS
+
+        if self.members is None:
+            return number + 1, np.eye(3)
+        return int(self.members.group[number]), self.members.place[number, PLACE_A:PLACE_MASS].reshape(3, 3)
+
+    def _places_of(self, body: int) -> np.ndarray:
+        """Return where the unknowns of an integrated body are."""
+        return T.rows_in(self.idata, int(self.idata[T.H_I_AT]), int(self.idata[T.H_BODIES]), T.AT_COLUMNS)[body]
+
+    def _angular_velocity(self, name: str) -> Reader | None:
+        """Return a reader of a body's angular velocity, global components."""
+        if name not in self.system.model.names.bodies:
+            return None
+        number = self.system.model.names.bodies.index(name)
+        body, _ = self._moved_with(number)
+        if body == 0:
+            return lambda steps: np.zeros((len(steps.y), 3))
+        if self.turns:
+            return self._angular_velocity_about_axis(body)
+        row = self._places_of(body)
+        if row[T.AT_ANGLES] != 3:
+            return None
+        angles, rates = int(row[T.AT_THETA]), int(row[T.AT_EPS])
+
+        def reader(steps: Steps) -> np.ndarray:
+            (psi, theta), (e1, e2, e3) = steps.y[:, angles : angles + 2].T, steps.y[:, rates : rates + 3].T
+            c1, s1, across = np.cos(psi), np.sin(psi), np.sin(theta) * e3
+            return np.stack([c1 * e2 + s1 * across, s1 * e2 - c1 * across, e1 + np.cos(theta) * e3]).T
+
+        return reader
+
+    def _angular_velocity_about_axis(self, group: int) -> Reader:
+        """Return the same for a member of a group that turns about a fixed axis."""
+        from gearmbs.dae.equations import fixed_axes as fx
+        from gearmbs.dae.model.fixed_axes import axes_of
+
+        axis, turn = (table[group - 1] for table in axes_of(self.idata, self.rdata))
+        along = turn[fx.TURN_AXIS : fx.TURN_AXIS + 3].copy()
+        if axis[fx.AXIS_PHI] >= 0:
+            rate = int(axis[fx.AXIS_OMEGA])
+            return lambda steps: steps.y[:, rate, None] * along
+        value = int(self.idata[T.H_W_FUNCTION]) + T.FUNCTION_VALUES * int(axis[fx.AXIS_FUNCTION])
+        driven, sense = self._columns([value + 1]).start, float(turn[fx.TURN_SENSE])
+        return lambda steps: steps.left[:, driven, None] * (sense * along)
+
+    def _orientation_about_axis(self, number: int) -> Reader:
         """Return the same for a member of a group that turns about a fixed axis: A = a + b cos(phi) + c sin(phi)."""
         from gearmbs.dae.equations import fixed_axes as fx
         from gearmbs.dae.model.fixed_axes import axes_of
@@ -182,8 +235,6 @@ class Watch:
         members = self.members
         assert members is not None
         group = int(members.group[number])
-        if group == 0:
-            return None
         axis, turn = (table[group - 1] for table in axes_of(self.idata, self.rdata))
         place = members.place[number, PLACE_A:PLACE_MASS].reshape(3, 3)
         a, b, c = (part.reshape(3, 3) @ place for part in turn[fx.TURN_MATRIX : fx.TURN_MATRIX + 27].reshape(3, 9))

@@ -208,10 +208,11 @@ def simulate(
         and each valid during the call only, instead of keeping all steps in memory; see
         `gearmbs.dae.results.watched.Stream`. The solution returned then holds nothing but the last step.
     watch : sequence of (str, str)
-        With a ``consumer``: methods of the solution, ``"reaction_force"``, ``"orientation"`` or ``"diagnostics"``, with
-        the names they will be called with. The parts handed to it then return what the integrator has of them at its
-        own steps, off by what the corrector leaves, where everything else is evaluated anew for each step, which takes
-        about as long as the step. What an integrator or a formulation does not have at hand is evaluated as without it.
+        With a ``consumer``: methods of the solution, ``"reaction_force"``, ``"orientation"``, ``"angular_velocity"`` or
+        ``"diagnostics"``, with the names they will be called with. The parts handed to it then return what the
+        integrator has of them at its own steps, off by what the corrector leaves, where everything else is evaluated
+        anew for each step, which takes about as long as the step. What an integrator or a formulation does not have at
+        hand is evaluated as without it.
     lump : bool, optional
         Integrate bodies that fixed joints connect, or fix to the ground, as one, and if all that is left turns about
         fixed axes, its angles alone; default the mechanism's ``lump``, which only some presets set, and not with

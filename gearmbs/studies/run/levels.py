@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,8 +29,10 @@ def told_way(records: Iterable[xr.Dataset]) -> str:
     return WAYS[0] if all(np.isfinite(one.sel(way=WAYS[0]).values).all() for one in levels) else WAYS[1]
 
 
-def mesh_levels(case: Case, acceleration: xr.DataArray) -> xr.DataArray:
-    """Return the RMS of the mesh harmonics by both ways; NaN by bands of a record that is too short for them.
+def mesh_levels(case: Case, acceleration: xr.DataArray) -> tuple[tuple, dict[str, Any]]:
+    """Return the RMS of the mesh harmonics by both ways, as `level_parts` does.
+
+    Bands are NaN of a record that is too short for them.
 
     Both are those of whole periods of the faulty teeth where the record holds one. A record that is not longer than one
     by as much as the band-passes take is seen as a part of a motion that repeats itself.
@@ -49,7 +51,7 @@ def mesh_levels(case: Case, acceleration: xr.DataArray) -> xr.DataArray:
     else:
         orders = order_rms(acceleration, gmf, list(range(1, HARMONICS + 1))).values
         values = np.stack([np.full_like(orders, np.nan), orders])
-    return as_levels(values, acceleration["channel"].values, gmf)
+    return level_parts(values, acceleration["channel"].values, gmf)
 
 
 def bands_of_lines(case: Case, periods: int, lines: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -75,33 +77,30 @@ def bands_of_lines(case: Case, periods: int, lines: Callable[[np.ndarray], np.nd
     return np.stack(bands)
 
 
-def as_levels(values: np.ndarray, components: np.ndarray, mesh_frequency: float) -> xr.DataArray:
-    """Return the RMS of the mesh harmonics, shape (ways, harmonics, components), with their names."""
-    import xarray as xr
-
+def level_parts(values: np.ndarray, components: np.ndarray, mesh_frequency: float) -> tuple[tuple, dict[str, Any]]:
+    """Return the RMS of the mesh harmonics, shape (ways, harmonics, components), as a variable, and its coordinates."""
     harmonics = np.arange(1, HARMONICS + 1)
-    found = xr.DataArray(
-        values,
-        dims=("way", "harmonic", "component"),
-        coords={
-            "harmonic": harmonics,
-            "frequency": ("harmonic", harmonics * mesh_frequency, {"units": "Hz"}),
-            "component": components,
-            "way": list(WAYS),
-        },
-    )
-    found.attrs = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
-    return found
+    coords = {
+        "harmonic": harmonics,
+        "frequency": ("harmonic", harmonics * mesh_frequency, {"units": "Hz"}),
+        "component": components,
+        "way": list(WAYS),
+    }
+    told = {"units": "m/s^2", "long_name": "RMS of the gear mesh frequency harmonics"}
+    return (("way", "harmonic", "component"), values, told), coords
 
 
-def tracked_levels(case: Case, acceleration: xr.DataArray, dataset: xr.Dataset) -> xr.DataArray:
-    """Return the RMS of the mesh orders along a run-up, by order tracking over four revolutions at a time."""
+def tracked_levels(case: Case, acceleration: xr.DataArray, turning: Mapping[str, tuple]) -> xr.DataArray:
+    """Return the RMS of the mesh orders along a run-up, by order tracking over four revolutions at a time.
+
+    ``turning`` has values and attributes of the driver's ``speed`` and ``angle`` over the signal's times.
+    """
     # what only run-ups need takes longer to load than many a simulation
     from gearmbs.signals import order_track
 
-    turning = {name: ("time", dataset[name].values, dataset[name].attrs) for name in ("speed", "angle")}
+    over_time = {name: ("time", *turning[name][1:]) for name in ("speed", "angle")}
     orders = [float(case.gears.teeth[0] * k) for k in range(1, HARMONICS + 1)]
-    tracks = order_track(acceleration.assign_coords(turning), orders=orders, scaling="rms")
+    tracks = order_track(acceleration.assign_coords(over_time), orders=orders, scaling="rms")
     found = tracks.rename(time="track_time", speed="track_speed", angle="track_angle", order="harmonic")
     found = found.rename(channel="component").drop_vars(["units", "channel_units"], errors="ignore")
     found = found.assign_coords(harmonic=np.arange(1, HARMONICS + 1))

@@ -23,7 +23,7 @@ from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.drive import drive_angle
 from gearmbs.studies.case.limits import edge, remarks
 from gearmbs.studies.case.sections import units_of_fields
-from gearmbs.studies.run.levels import LEVELS, as_levels, mesh_levels, tracked_levels
+from gearmbs.studies.run.levels import LEVELS, level_parts, mesh_levels, tracked_levels
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of
 
 if TYPE_CHECKING:
@@ -89,37 +89,41 @@ def evaluate(
     wanted = set(VARIABLES if variables is None else variables) - (set(LEVELS) - {level})
     start, stop = span or span_of(case)
     signal_stop = stop if signal_stop is None else signal_stop
-    dataset = xr.Dataset()
     made = wanted - {"gmf_rms"} if levels is not None else wanted
     if even:
         first = int(np.searchsorted(known.t, start - edge(case) - 0.5 / case.output_rate))
         contact = {name: values[first:] for name, values in known.contact.items()}
         known = Measured(known.t[first:], known.forces[first:], known.error[first:], contact)
     forces = _even_forces(case, known, start, signal_stop if made & {"acceleration"} else stop, made, even=even)
-    if wanted & set(SERIES):
-        dataset = _series(case, known, forces, (start, stop), wanted, even=even)
+    # all at once: a dataset to which one variable after the other is added compares its coordinates each time
+    data, coords = _series(case, known, forces, (start, stop), wanted, even=even) if wanted & set(SERIES) else ({}, {})
+    of_levels: dict[str, Any] = {}
     if levels is not None and level in wanted:
-        dataset[level] = as_levels(levels, np.array(COMPONENTS), case.mesh_frequency)
-    if not made & {"acceleration", *LEVELS}:
-        return dataset
-    assert forces is not None
-    acceleration = _acceleration(case, forces, start, signal_stop)
-    without_units = acceleration.drop_vars(["channel_units", "units"], errors="ignore")
-    dataset["acceleration"] = without_units.rename(time="signal_time", channel="component")
-    dataset["acceleration"].attrs.update(
-        units="m/s^2",
-        long_name="force on the driven gear over its mass (Newton's second law)",
-        teeth_in_mesh=teeth_in_mesh(case, start),
-    )
-    if case.operation.speed_curve is not None:
-        dataset = dataset.assign_coords(_turning(case, dataset["signal_time"].values))
-    if level in made:
-        dataset[level] = (
-            mesh_levels(case, acceleration) if level == "gmf_rms" else tracked_levels(case, acceleration, dataset)
-        )
-    if "acceleration" not in wanted:
-        dataset = dataset.drop_vars(["acceleration", "signal_time", "speed", "angle"], errors="ignore")
-    return dataset
+        data[level], of_levels = level_parts(levels, np.array(COMPONENTS), case.mesh_frequency)
+    if made & {"acceleration", *LEVELS}:
+        assert forces is not None
+        acceleration = _acceleration(case, forces, start, signal_stop)
+        t = acceleration["time"].values
+        turning = {} if case.operation.speed_curve is None else _turning(case, t)
+        if "acceleration" in wanted:
+            told = {
+                "units": "m/s^2",
+                "long_name": "force on the driven gear over its mass (Newton's second law)",
+                "teeth_in_mesh": teeth_in_mesh(case, start),
+            }
+            data["acceleration"] = ("signal_time", "component"), acceleration.values, {**acceleration.attrs, **told}
+            coords["signal_time"] = ("signal_time", t, {"units": "s"})
+            coords["component"] = acceleration["channel"].values
+            coords |= turning
+        if level in made and level == "gmf_rms":
+            data[level], of_levels = mesh_levels(case, acceleration)
+        elif level in made:
+            data[level] = tracked_levels(case, acceleration, turning)
+    return xr.Dataset(data, coords={**coords, **of_levels})
+
+
+Parts = tuple[dict[str, Any], dict[str, Any]]
+"""Variables and coordinates of a dataset, as it takes them."""
 
 
 class _EvenForces(NamedTuple):
@@ -154,8 +158,8 @@ def _even_forces(
 
 def _series(
     case: Case, known: Measured, forces: _EvenForces | None, span: tuple[float, float], wanted: set[str], *, even: bool
-) -> xr.Dataset:
-    """Return the variables over time that are wanted."""
+) -> Parts:
+    """Return the variables over time that are wanted, and their coordinates."""
     rate = case.output_rate
     t = _even_times(case, known, *span, even=even) if forces is None else forces.t
     inside = slice(*np.searchsorted(t, [at - 0.5 / rate for at in span]))
@@ -167,7 +171,7 @@ def _series(
             values[name] = forces.values[inside, first : first + 3]
     if even:
         told = {"transmission_error": known.error, **known.contact}
-        return time_series(t, values | {name: told[name][inside] for name in told if name in wanted})
+        return _parts_over_time(t, values | {name: told[name][inside] for name in told if name in wanted})
     values = {name: force.copy() for name, force in values.items()}
     if "transmission_error" in wanted:
         values["transmission_error"] = monotone_cubic(known.t, known.error, t)
@@ -175,7 +179,7 @@ def _series(
     if wanted & set(COUNTS):
         latest = np.clip(np.searchsorted(known.t, t, side="right") - 1, 0, known.t.size - 1)
         values |= {name: known.contact[name][latest] for name in COUNTS if name in wanted}
-    return time_series(t, values)
+    return _parts_over_time(t, values)
 
 
 def _even_times(case: Case, known: Measured, start: float, stop: float, *, even: bool) -> np.ndarray:
@@ -189,8 +193,14 @@ def _even_times(case: Case, known: Measured, start: float, stop: float, *, even:
 
 def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
     """Return the dataset of variables over time, whichever of `SERIES` there are; numbers of teeth are integers."""
-    import pandas as pd
     import xarray as xr
+
+    return xr.Dataset(*_parts_over_time(t, values))
+
+
+def _parts_over_time(t: np.ndarray, values: dict[str, np.ndarray]) -> Parts:
+    """Return variables and coordinates of `time_series`."""
+    import pandas as pd
 
     units = {**SMOOTH, **COUNTS, "transmission_error": "m"}
     long_names = {"transmission_error": "lag of the driven wheel at its base circle"}
@@ -210,7 +220,7 @@ def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
     coords: dict[str, Any] = {"time": ("time", pd.Index(t, copy=False), {"units": "s"})}
     if any(name in data for name in FORCES):
         coords["xyz"] = ["x", "y", "z"]
-    return xr.Dataset(data, coords=coords)
+    return data, coords
 
 
 def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) -> xr.DataArray:
