@@ -61,19 +61,18 @@ def lines_by_meetings(
         Pulses of each encoder in it.
     """
     hidden = hidden or [()] * len(found)
-    known = [
-        [] if mesh is None else [float(o) for o in (*orders, *own) if (o / mesh).denominator == 1] for own in hidden
-    ]
+    # orders on whose lines a missing pulse lies
+    known = [] if mesh is None else [float(o) for o in orders if (o / mesh).denominator == 1]
     if not averaged(window, period):
-        whole = [bridged(one, own, window) for one, own in zip(found, known, strict=True)]
+        whole = [bridged(one, known, window) for one in found]
         return lines(whole, orders, steps, window, signs, mesh, hidden)
     meetings = window.turns / float(period)
     wanted = multiples(orders, steps)
     values, variances = dict.fromkeys(orders, 0.0j), dict.fromkeys(orders, 0.0)
-    for one, sign, count, beyond, of in zip(found, signs, counts, hidden, known, strict=True):
+    for one, sign, count, beyond in zip(found, signs, counts, hidden, strict=True):
         mean, left = _mean_meeting(one, count, float(period), window)
         closed = Window(float(mean.phi[0]), float(period), 0.0)
-        own, _ = taken_out(bridged(mean, of, closed), orders, wanted, closed, mesh, beyond)
+        own, _ = taken_out(bridged(mean, known, closed), orders, wanted, closed, mesh, beyond)
         # a mean of n has 1/n of the noise, which what is left lacks
         lost = meetings / (meetings - 1.0)
         for order, variance in scatter(one, left, wanted, window).items():
