@@ -117,15 +117,19 @@ def boxes() -> Iterator[Box]:
     m.gear_contact("mesh", *bodies, pair)
     yield _turned("the same, 15° helical", m, [s.name for s in seats], pair.geometry.driver.base_radius,
                   {"teeth": (21, 34)}, 34 / 21, 21.0)  # fmt: skip
-    counts = (24, 30, 84)
+    rig, radius, ratio, mesh, _ = planetary_rig()
+    name, known = "planetary set 24, 30, 84, sun to carrier, 1350 rpm, 50 N m", {"ratio": ratio, "mesh_order": mesh}
+    yield _turned(name, rig, ["sun seat", "carrier seat"], radius, known, float(ratio), float(mesh))
+
+
+def planetary_rig() -> tuple[Mechanism, float, Fraction, Fraction, float]:
+    """Return a planetary set, its sun's base radius, m, ratio and mesh order, sun to carrier, and speed, rad/s."""
     rig = planetary_mechanism(
-        planetary(counts, "1.5 mm", backlash_sun="0.05 mm", backlash_ring="0.05 mm"),
+        planetary((24, 30, 84), "1.5 mm", backlash_sun="0.05 mm", backlash_ring="0.05 mm"),
         speeds={"sun": "1350 rpm"}, torques={"carrier": "-50 N m"}, run_up="50 ms",
     )  # fmt: skip
     radius = 0.5 * 24 * 1.5e-3 * math.cos(math.radians(20.0))
-    ratio, mesh = Fraction(108, 24), Fraction(56, 3)
-    name, known = "planetary set 24, 30, 84, sun to carrier, 1350 rpm, 50 N m", {"ratio": ratio, "mesh_order": mesh}
-    yield _turned(name, rig, ["sun seat", "carrier seat"], radius, known, float(ratio), float(mesh))
+    return rig, radius, Fraction(108, 24), Fraction(56, 3), 1350.0 * math.tau / 60.0
 
 
 def _turned(name: str, m: Mechanism, seats: list[str], *known: Any) -> Box:

@@ -21,11 +21,12 @@ import scipy.interpolate
 import xarray as xr
 
 import gearmbs as gm
-from benchmarks.instruments import COUNTER, LINES, MARKS, Box, boxes
+from benchmarks.instruments import COUNTER, LINES, MARKS, Box, boxes, planetary_rig
 from benchmarks.markdown import table
 from gearmbs import signals
 from gearmbs.gears import GearPair, GearSpec
 from gearmbs.gears.transmission import loaded_transmission_error
+from gearmbs.mechanism import quasi_static
 
 SHOWN = 4
 """Mesh harmonics whose errors are shown."""
@@ -35,6 +36,8 @@ DRAWS = 1
 """Records of each gearbox and length."""
 POINTS = 1000
 """Samples of a mesh in which the shafts' angles are handed to the encoders, whose spline joins them."""
+SETTLED = 0.06
+"""s, when the set turns at its speed."""
 LEAST, LONG = 0.05e-6, 0.02e-6
 """m: lines from the first on are asked for of all, down to the second where one record shall be long enough for it."""
 ACCURACY, ALL, MOST = 0.02, 0.999, 0.95
@@ -74,6 +77,17 @@ class Steady(NamedTuple):
             _closed(error - error.mean()),
         )  # fmt: skip
 
+    @classmethod
+    def of_set(cls, name: str, points: int = POINTS) -> Steady:
+        """Return the loaded static curve of a planetary set, sun to carrier, at the speed of the simulated one."""
+        mechanism, radius, ratio, mesh, speed = planetary_rig()
+        at = SETTLED + np.arange(points + 1) / points * math.tau / (speed * float(mesh))
+        solution = quasi_static(mechanism, at)
+        sun, carrier = (np.unwrap(solution.joint_angle(f"{n} seat")) for n in ("sun", "carrier"))
+        lag = radius * (sun - float(ratio) * carrier)[:-1]
+        known = {"ratio": ratio, "mesh_order": mesh}
+        return cls(name, speed, radius, known, ratio, mesh, _closed(lag - lag.mean()))
+
     def exact(self, count: int) -> np.ndarray:
         """Return the amplitudes of the first mesh harmonics, m."""
         phase = np.arange(16 * POINTS) / (16 * POINTS)
@@ -83,22 +97,29 @@ class Steady(NamedTuple):
         """Return what its encoders are."""
         return signals.EncoderPair(self.radius, self.speed, LINES, COUNTER["jitter"], COUNTER["clock"], self.ratio)
 
-    def train(self, shaft: int, seconds: float, disc: int, seed: int, free: bool) -> signals.PulseTrain:
-        """Return the pulses of an encoder in as many meetings, or turns of the shaft running free, as fit."""
-        turn = self.ratio if shaft else Fraction(1)
-        period = turn if free else Fraction(self.ratio.numerator)
+    def pulses(self, shaft: int, turns: float, disc: int | None, free: bool = False) -> signals.PulseTrain:
+        """Return the exact pulses of an encoder in some turns of the driver and more; of a disc's marks or none."""
         ends = 3.0 * max(1.0, float(self.ratio))
-        step = 1.0 / (POINTS * float(self.mesh))
-        turned = np.arange(-ends, float(period) + ends, step)
+        turned = np.arange(-ends, turns + ends, 1.0 / (POINTS * float(self.mesh)))
         angle = math.tau * turned
         if shaft:
             lag = 0.0 if free else self.curve(np.mod(float(self.mesh) * turned, 1.0))
             angle = (angle - lag / self.radius) / float(self.ratio)
-        one = signals.encoder(
+        return signals.encoder(
             xr.DataArray(angle, dims=("time",), coords={"time": math.tau / self.speed * turned}), LINES,
-            marks=signals.mark_errors(LINES, MARKS, 2 * disc + shaft), mounted=0.3 * shaft,
-            **({"index": True} if shaft else {"lacking": [0]}),
+            marks=None if disc is None else signals.mark_errors(LINES, MARKS, 2 * disc + shaft), mounted=0.3 * shaft,
+            name=("driver", "driven")[shaft], **({"index": True} if shaft else {"lacking": [0]}),
         )  # fmt: skip
+
+    def plain(self, shaft: int, seconds: float) -> signals.PulseTrain:
+        """Return the pulses of an encoder whose marks have no errors, one of them missing, in some seconds."""
+        return self.pulses(shaft, seconds * self.speed / math.tau, None)
+
+    def train(self, shaft: int, seconds: float, disc: int, seed: int, free: bool) -> signals.PulseTrain:
+        """Return the pulses of an encoder in as many meetings, or turns of the shaft running free, as fit."""
+        turn = self.ratio if shaft else Fraction(1)
+        period = turn if free else Fraction(self.ratio.numerator)
+        one = self.pulses(shaft, float(period), disc, free)
         count, first = int(LINES * period / turn), one.numbers[np.searchsorted(one.times, 0.0)]
         kept = (one.numbers >= first) & (one.numbers < first + count)
         long = math.tau / self.speed * float(period)
@@ -168,37 +189,46 @@ def _asked() -> Iterator[tuple[Steady, float, float, dict[str, int]]]:
         if steady.exact(HARMONICS)[SHOWN:].max() > heights[1]:
             # harmonics beyond half the lines are larger than most of those below
             yield steady._replace(name=f"the same, harmonics={HARMONICS}"), least, ALL, {"harmonics": HARMONICS}
+        if heights.min() < LONG:
+            slow = steady._replace(name="the same at a tenth of the speed", speed=0.1 * steady.speed)
+            yield slow, heights.min(), MOST, {}
 
 
 def curves() -> str:
     """Return how near the loaded static curves come back."""
     usual = {"module": "2.5 mm", "face_width": "20 mm"}
     leaning = {**usual, "helix_angle": "15 deg"}
-    # with a factor that teeth and lines share, as of 34 and 1024, harmonics beyond 64 are not seen
     pairs = (
         ("paper's pair, 955 rpm, 100 N m", GearPair.paper(backlash="0.1 mm"), 100.0, 100.0, ((4.0, 64), (16.0, 128))),
         ("21 and 34 teeth, 1500 rpm, 60 N m", GearPair(GearSpec(21, **usual), GearSpec(34, **usual), backlash="0.1 mm"),
-         60.0, 50 * math.pi, ((4.0, 64), (16.0, 64))),
+         60.0, 50 * math.pi, ((4.0, 64), (16.0, 128))),
         ("the same, 15° helical", GearPair(GearSpec(21, **leaning), GearSpec(34, **leaning, hand="left"),
                                            backlash="0.1 mm"), 60.0, 50 * math.pi, ((4.0, 64),)),
     )  # fmt: skip
+    cases = [(Steady.of_pair(name, pair, torque, speed), tries) for name, pair, torque, speed, tries in pairs]
+    cases.append(
+        (Steady.of_set("planetary set 24, 30, 84, sun to carrier, 1350 rpm, 50 N m"), ((16.0, 64), (64.0, 128)))
+    )
     rows = []
-    for name, pair, torque, speed, tries in pairs:
-        steady = Steady.of_pair(name, pair, torque, speed)
+    for steady, tries in cases:
         whole = steady.curve(np.arange(2 * POINTS) / (2 * POINTS))
         lines = np.fft.rfft(whole)
         for seconds, count in tries:
             off, lost = [], []
             for draw in range(DRAWS):
                 found = steady.measured(seconds, 300 + draw, harmonics=count)
-                off.append(1e6 * np.abs(found.mesh_cycle(points=2 * POINTS)[1] - whole).max())
+                seen = found.mesh_cycle(points=2 * POINTS)[1]
+                # where a turn has no whole number of meshes, the phase is that of one of the turns
+                turns = np.arange(steady.mesh.denominator) * float(steady.mesh)
+                begins = (steady.curve(np.mod(np.arange(2 * POINTS) / (2 * POINTS) + t, 1.0)) for t in turns)
+                off.append(1e6 * min(float(np.abs(seen - begin).max()) for begin in begins))
                 lost = sorted({*range(1, count + 1)} - {*found.harmonics()["harmonic"]})
             kept = np.zeros(lines.size, dtype=bool)
             kept[1 : count + 1] = True
             kept[lost] = False
             without = 1e6 * np.abs(np.fft.irfft(np.where(kept, lines, 0.0), whole.size) - whole).max()
             rows.append([
-                name, f"{1e6 * np.ptp(whole):.2f}", f"{seconds:g}", f"{count}, {len(lost)} of them not seen",
+                steady.name, f"{1e6 * np.ptp(whole):.2f}", f"{seconds:g}", f"{count}, {len(lost)} of them not seen",
                 f"{without:.3f}", f"{max(off):.3f}",
             ])  # fmt: skip
             print(rows[-1], flush=True)

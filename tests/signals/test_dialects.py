@@ -66,10 +66,12 @@ def test_names_of_the_rate_above_a_table(tmp_path, line):
     assert_is(read_signal(path), X, Y)
 
 
-@pytest.mark.parametrize("name", ["rate", "sr", "fs", "Fs", "SampFreq", "sampling_rate", "SampleRate", "XInc", "dt"])
+@pytest.mark.parametrize(
+    "name", ["rate", "sr", "fs", "Fs", "SampFreq", "sampling_rate", "SampleRate", "XInc", "dt", "Tinterval"]
+)
 @pytest.mark.parametrize("form", ["flat", "struct", "hdf5", "npz"])
 def test_names_of_the_rate_in_binary_files(tmp_path, name, form):
-    value = 1 / RATE if name in ("XInc", "dt") else RATE
+    value = 1 / RATE if name in ("XInc", "dt", "Tinterval") else RATE
     if form == "flat":
         path = tmp_path / "x.mat"
         scipy.io.savemat(path, {"acc": X, name: value})
@@ -161,6 +163,10 @@ STAMPED = pd.date_range("2024-02-28 23:59:59.998", periods=COUNT, freq="78125ns"
         [t.strftime("%Y/%m/%d,%H:%M:%S.") + f"{t.nanosecond + 1000 * t.microsecond:09d}" for t in STAMPED],
         [t.strftime("%d.%m.%Y %H:%M:%S.") + f"{t.nanosecond + 1000 * t.microsecond:09d}" for t in STAMPED],
         [t.strftime("%H:%M:%S.") + f"{t.nanosecond + 1000 * t.microsecond:09d}" for t in STAMPED],
+        [
+            f"1 days 00:00:{t.second:02d}.{t.microsecond:06d}{t.nanosecond:03d}"
+            for t in pd.date_range("1970-01-01", periods=COUNT, freq="78125ns")
+        ],
         [f"{t.value / 1e9:.9f}" for t in pd.date_range("1970-01-01", periods=COUNT, freq="78125ns")],
     ],
 )

@@ -232,6 +232,9 @@ FORMS: dict[str, tuple[str, str, tuple[np.ndarray, ...], int]] = {
     "vibration in degrees": ("t [s],torsion [deg],acc [g]", ",", (TIME, A2, A1), 2),
     "Italian": ("Tempo [s];Accelerazione [m/s2];Giri [giri/min]", ";", (TIME, A1, SPEED), 1),
     "Polish": ("Czas [s];Drgania [m/s2];Obroty [obr/min]", ";", (TIME, A1, SPEED), 1),
+    "types of numbers below units": ("Zeit;a;n\ns;g;1/min\nDouble;DT_FLOAT;Int32", ";", (TIME, A1, np.rint(SPEED)), 1),
+    "units above names": ("s\tm/s^2\trpm\nTime\tHSG:+X\tTacho1", "\t", (TIME, A1, SPEED), 1),
+    "times behind numbers of rows": ("X-axis unit:\ts\n", "\t", (np.arange(1.0, COUNT + 1.0), TIME, A1), 1),
     "an oscilloscope": ("Time,Channel A,Channel B\n(ms),(mV),(V)\n", ",", (1e3 * TIME, A1, A2), 2),
 }
 """What a header says, the sign between columns, the columns, and how many are vibration."""

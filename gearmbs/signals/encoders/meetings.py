@@ -47,30 +47,32 @@ def lines_by_meetings(
     *,
     period: Fraction,
     counts: Sequence[int],
-    known: Sequence[float] = (),
+    hidden: Sequence[Sequence[Fraction]] = (),
 ) -> dict[Fraction, Line]:
     """Return what `gearmbs.signals.encoders.orders.lines` does, of long records by the mean of all meetings.
 
     Parameters
     ----------
-    found, orders, steps, window, signs, mesh
+    found, orders, steps, window, signs, mesh, hidden
         As there; a pulse that is missing in all meetings is bridged in their mean.
     period : Fraction
         Turns of the common angle after which all recurs.
     counts : sequence of int
         Pulses of each encoder in it.
-    known : sequence of float
-        Orders whose lines a missing pulse lies on.
     """
+    hidden = hidden or [()] * len(found)
+    # orders on whose lines a missing pulse lies
+    known = [] if mesh is None else [float(o) for o in orders if (o / mesh).denominator == 1]
     if not averaged(window, period):
-        return lines([bridged(one, known, window) for one in found], orders, steps, window, signs, mesh)
+        whole = [bridged(one, known, window) for one in found]
+        return lines(whole, orders, steps, window, signs, mesh, hidden)
     meetings = window.turns / float(period)
     wanted = multiples(orders, steps)
     values, variances = dict.fromkeys(orders, 0.0j), dict.fromkeys(orders, 0.0)
-    for one, sign, count in zip(found, signs, counts, strict=True):
+    for one, sign, count, beyond in zip(found, signs, counts, hidden, strict=True):
         mean, left = _mean_meeting(one, count, float(period), window)
         closed = Window(float(mean.phi[0]), float(period), 0.0)
-        own, _ = taken_out(bridged(mean, known, closed), orders, wanted, closed, mesh)
+        own, _ = taken_out(bridged(mean, known, closed), orders, wanted, closed, mesh, beyond)
         # a mean of n has 1/n of the noise, which what is left lacks
         lost = meetings / (meetings - 1.0)
         for order, variance in scatter(one, left, wanted, window).items():

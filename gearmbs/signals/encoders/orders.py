@@ -38,6 +38,8 @@ FLANK = 4.0
 beside a line and no line itself is let through to 1/15 of what it would be by flanks of no length."""
 MOST_SCATTER = 128
 """Turns, spread over the record, by which the scatter of a line is told, at most: its square is then known to 6 %."""
+CLEAR_OF_LEAKS = 2.0
+"""Times what others leak, RMS, from which a line is one: leaks alone are so in one of fifty."""
 WHOLE = 1e-9
 """Difference from a whole number up to which an order is one: of ratios written as decimals."""
 
@@ -237,6 +239,7 @@ def lines(
     window: Window,
     signs: Sequence[float],
     mesh: Fraction | None = None,
+    hidden: Sequence[Sequence[Fraction]] = (),
 ) -> dict[Fraction, Line]:
     """Return lines of the sum of several encoders' deviations, with variances by the scatter from turn to turn.
 
@@ -253,12 +256,14 @@ def lines(
         Factors of the encoders.
     mesh : Fraction, optional
         Order of whose multiples among `orders` the lines are taken out first, as the largest.
+    hidden : sequence of sequence of Fraction
+        Further multiples of it that each encoder has, to be taken out with these and not returned.
     """
     wanted = multiples(orders, steps)
     values = dict.fromkeys(orders, 0.0j)
     variances = dict.fromkeys(orders, 0.0)
-    for one, sign in zip(found, signs):
-        own, left = taken_out(one, orders, wanted, window, mesh)
+    for one, sign, beyond in zip(found, signs, hidden or [()] * len(found)):
+        own, left = taken_out(one, orders, wanted, window, mesh, beyond)
         for order, variance in scatter(one, left, wanted, window).items():
             variances[order] += variance
         for order, value in own.items():
@@ -280,17 +285,28 @@ def multiples(orders: Sequence[Fraction], steps: Sequence[Fraction]) -> Multiple
 
 
 def taken_out(
-    one: Deviations, orders: Sequence[Fraction], wanted: Multiples, window: Window, mesh: Fraction | None
+    one: Deviations,
+    orders: Sequence[Fraction],
+    wanted: Multiples,
+    window: Window,
+    mesh: Fraction | None,
+    hidden: Sequence[Fraction] = (),
 ) -> tuple[dict[Fraction, complex], np.ndarray]:
-    """Return the lines of an encoder, and what its deviations are without them."""
+    """Return the lines of an encoder, and what its deviations are without them and without hidden multiples of `mesh`.
+
+    What marks fold is at its own order in the pulses, which are where the uneven marks are: as a line of the order that
+    it is folded to it would leave a part in all others.
+    """
+    weights = window.weights(one.phi, one.spacing)
     # uneven marks leak a part of each line into all others: the lines of what is left make up for it
     apart = float(min(np.diff([float(o) for o in sorted(orders)]), default=1.0)) * window.turns > APART
     stages = [wanted, wanted] if apart else [wanted]
     if mesh is not None:
-        large = {mesh: {int(order / mesh): order for order in orders if (order / mesh).denominator == 1}}
-        stages = [large, large, *stages]
-    values = dict.fromkeys(orders, 0.0j)
-    weights = window.weights(one.phi, one.spacing)
+        own = {int(order / mesh): order for order in orders if (order / mesh).denominator == 1}
+        beyond = _clear_of_leaks(one, weights, mesh, own, {int(order / mesh): order for order in hidden})
+        large = {mesh: own | beyond}
+        stages = [large, large, *([large] if beyond else []), *stages]
+    values = dict.fromkeys((*orders, *hidden), 0.0j)
     # what is left beside all lines is noise: those of one shaft would scatter over turns of the other
     left = one.values.copy()
     for stage in stages:
@@ -300,7 +316,30 @@ def taken_out(
                 value = complex(rest @ rotating)
                 values[order] += value
                 left -= np.real(value * rotating.conj())
-    return values, left
+    return {order: values[order] for order in orders}, left
+
+
+def _clear_of_leaks(
+    one: Deviations, weights: np.ndarray, mesh: Fraction, own: dict[int, Fraction], hidden: dict[int, Fraction]
+) -> dict[int, Fraction]:
+    """Return those of the hidden multiples of `mesh` that are more than what other lines leak onto them.
+
+    A line a of the order o' leaves (o - o') eps a/sqrt(2 L) in each part at the order o, with eps the uneven marks' and
+    L their number. A line that is nothing but leaks would put back its own.
+    """
+    if not hidden:
+        return {}
+    every = dict(sorted((own | hidden).items()))
+    rest = weights * one.values
+    size = np.array([abs(rest @ rotating) for _, rotating in _rotating(one.phi, mesh, every)])
+    number = np.array(list(every), dtype=float)
+    line = np.polynomial.Polynomial.fit(one.numbers, one.phi, 1)
+    uneven = float(np.std(one.phi - line(one.numbers)))
+    count = TURN / float(np.median(one.spacing))
+    apart = float(mesh) * (number[:, None] - number)
+    leaks = uneven * np.sqrt(apart**2 @ size**2 / count)
+    clear = size > CLEAR_OF_LEAKS * leaks
+    return {k: order for k, order in hidden.items() if clear[int(np.searchsorted(number, k))]}
 
 
 def scatter(one: Deviations, left: np.ndarray, wanted: Multiples, window: Window) -> dict[Fraction, float]:

@@ -148,7 +148,10 @@ class MeasuredTransmissionError(Shown):
         return table
 
     def harmonics(self, load: str | None = None) -> pd.DataFrame:
-        """Mesh harmonics of a load: peak amplitude with its interval (m), phase (rad) at mark 0 of the driver."""
+        """Mesh harmonics of a load: peak amplitude with its interval (m), phase (rad) at mark 0 of the driver.
+
+        Of a set whose mesh orders are no whole ones of the driver, but of the driven shaft, at mark 0 of that.
+        """
         return self.lines_with_intervals({self._load(load): 1.0}, [o for o in self.lines if o.harmonic])
 
     def difference(self, load: str, other: str) -> pd.DataFrame:
@@ -282,12 +285,18 @@ class MeasuredTransmissionError(Shown):
         return turns * np.arange(values.size) / values.size, values
 
     def mesh_cycle(self, load: str | None = None, points: int = 400) -> tuple[np.ndarray, np.ndarray]:
-        """Error over one mesh cycle from its harmonics: phase, 0 up to 1 from mark 0 of the driver, and error, m."""
-        phase = np.arange(points) / points
+        """Error over one mesh cycle from its harmonics: phase, 0 up to 1 from mark 0 of the driver, and error, m.
+
+        Where a turn of the driver has no whole number of meshes, from mark 0 in the first of its turns.
+        """
+        phase, load = np.arange(points) / points, self._load(load)
         error = np.zeros(points)
         for one in self.lines:
             if one.harmonic:
-                error += np.real(self._value(one, self._load(load))[0] * np.exp(1j * TURN * one.harmonic * phase))
+                value = self._value(one, load)[0]
+                if one.first is None and one.second is not None:
+                    value *= np.exp(1j * one.second * self.places[load])
+                error += np.real(value * np.exp(1j * TURN * one.harmonic * phase))
         return phase, error
 
     def single_flank(self, load: str | None = None) -> pd.DataFrame:

@@ -30,7 +30,15 @@ from gearmbs.signals.encoders.orders import (
 from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
-from gearmbs.signals.encoders.visible import MOST_HARMONICS, Order, visible_orders
+from gearmbs.signals.encoders.visible import (
+    MOST_HARMONICS,
+    Order,
+    folded_onto,
+    hidden_harmonics,
+    shadow,
+    standing_harmonics,
+    visible_orders,
+)
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.rotation.phase import MOST_MISSING
 from gearmbs.signals.signal.signal import check_teeth
@@ -166,7 +174,11 @@ def transmission_error_from_pulses(
     remarks += _check_free(runs, freed, gearing)
     # known marks are put right where the pulses are, as the wheels' lag moves them; what is left of them is an unknown
     errors = {name: encoder_marks(trains).errors if trains else None for name, trains in freed.items()}
-    measured = [_lines_of(run, gearing, orders, errors) for run in runs]
+    measured, standing = _all_lines(runs, gearing, orders, errors)
+    if standing:
+        orders = [o for o in orders if o.order not in standing]
+        measured, _ = _all_lines(runs, gearing, orders, errors)
+        refused += folded_onto(standing, gearing)
     shifts, notes = _shifts(measured, gearing)
     notes = list(dict.fromkeys([n for r in runs for t in (r.driver, r.driven) for n in t.notes] + notes + remarks))
     marks = {
@@ -174,10 +186,12 @@ def transmission_error_from_pulses(
         for k, name in enumerate(freed)
     }
     levels = _Levels(gearing, orders, measured, trains, mark_error, {n for n in marks if marks[n]})
+    shadows = _shadows(gearing, orders, measured, trains)
     found = []
     for order in orders:
         known = {name: level for name in marks if not marks[name] and (level := levels.at(order, name)) is not None}
-        rows = _rows(order, gearing, measured, shifts, marks, known.get("driven", 0.0), levels.folded(order, trains))
+        beside = levels.folded(order, trains) + shadows.get(order.order, 0.0)
+        rows = _rows(order, gearing, measured, shifts, marks, known.get("driven", 0.0), beside)
         solved = estimate(rows, known)
         calibrated = all(_is_calibrated(solved, known, name) for name in solved.names if name in known)
         freedom = 2.0 * sum(m.scattered - 1 for m in measured) if calibrated else levels.freedom
@@ -303,8 +317,25 @@ SURELY = 3.0
 """Standard errors by which a share must be below it: of a disc whose share is 1 fewer than 1 in 800 are."""
 
 
+def _all_lines(
+    runs: Sequence[CoupledRun], gearing: Gearing, orders: Sequence[Order], errors: Mapping[str, np.ndarray | None]
+) -> tuple[list[_Measured], dict[Fraction, tuple[str, int]]]:
+    """Evaluate all runs; with known marks, also the shafts' orders that turn out to be later mesh harmonics, folded."""
+    trains = (runs[0].driver, runs[0].driven)
+    hidden = hidden_harmonics(gearing, trains, orders)
+    measured = [_lines_of(run, gearing, orders, hidden, errors) for run in runs]
+    if any(known is None for known in errors.values()):
+        return measured, {}
+    squares = {o.order: float(np.mean([abs(m.values[o.order].value) ** 2 for m in measured])) for o in orders}
+    return measured, standing_harmonics(gearing, trains, orders, squares)
+
+
 def _lines_of(
-    run: CoupledRun, gearing: Gearing, orders: Sequence[Order], errors: Mapping[str, np.ndarray | None]
+    run: CoupledRun,
+    gearing: Gearing,
+    orders: Sequence[Order],
+    hidden: Sequence[Sequence[Fraction]],
+    errors: Mapping[str, np.ndarray | None],
 ) -> _Measured:
     """Evaluate a run at all orders."""
     course = smooth_angle(run.driver)
@@ -323,16 +354,16 @@ def _lines_of(
     first = deviations(run.driver, course, begin, end, 1.0, errors["driver"])
     second = deviations(run.driven, course, begin, end, scale, errors["driven"])
     _check_clocks(run, first.drift - second.drift, float(gearing.mesh), window.length)
-    known = [float(o.order) for o in orders if o.harmonic]
     period = Fraction(gearing.ratio.numerator)
     if not averaged(window, period):
+        known = [float(o.order) for o in orders if o.harmonic]
         first, second = (bridged(one, known, window) for one in (first, second))
     steps = (Fraction(1), 1 / gearing.ratio, gearing.mesh)
     # after as many turns of the first and second shaft the wheels meet again
     counts = (gearing.ratio.numerator * run.driver.lines, gearing.ratio.denominator * run.driven.lines)
     values = lines_by_meetings(
         (first, second), [o.order for o in orders], steps, window, (1.0, -1.0), gearing.mesh,
-        period=period, counts=counts, known=known,
+        period=period, counts=counts, hidden=hidden,
     )  # fmt: skip
     mesh = [o.order for o in orders if o.harmonic]
     trains = (run.driver, run.driven)
@@ -449,6 +480,28 @@ def _rows(
         if whole is not None:
             rows += [Row(*found[Fraction(whole)], {name: -1.0 + 0.0j}) for found in marks[name]]
     return rows
+
+
+def _shadows(
+    gearing: Gearing, orders: Sequence[Order], measured: Sequence[_Measured], trains: Sequence[PulseTrain]
+) -> dict[Fraction, float]:
+    """Return the variances (rad^2 of the first shaft) of what later mesh harmonics may add where they are folded onto.
+
+    Their amplitudes are taken to fall as the square of their number from those of the measured ones around.
+    """
+    mesh = [o for o in orders if o.harmonic]
+    square = np.array([np.mean([abs(m.values[o.order].value) ** 2 for m in measured]) for o in mesh])
+    found = {}
+    for k, order in enumerate(mesh):
+        later = shadow(gearing, trains, order.harmonic or 0)
+        if later is not None:
+            around = float(square[max(0, k - AROUND) : k + AROUND + 1].mean())
+            found[order.order] = 0.5 * around * ((order.harmonic or 0) / later) ** 4
+    return found
+
+
+AROUND = 2
+"""Harmonics to either side of one by which the height of those around it is told: spectra of curves have zeros."""
 
 
 def _whole(orders: Iterable[Order], shaft: int) -> list[int]:

@@ -1,9 +1,13 @@
-"""Which orders two encoders show: those below half their lines, and mesh harmonics that their lines fold but part."""
+"""Which orders two encoders show: those below half their lines, and mesh harmonics that their lines fold but part.
+
+What they do not show is there all the same, folded, and leaks from uneven marks into what they do: `hidden_harmonics`
+are taken out with the rest, and `shadow` says how much of a line may be that of one that falls upon it.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -79,10 +83,7 @@ def visible_orders(
     orders += [
         Order(o, whole_number(o), whole_number(gearing.on_second(o)), h) for h in fine for o in (gearing.mesh * h,)
     ]
-    for name, places in lost.items():
-        if places:
-            listed = _shortened([f"{at:g} (harmonic {h})" for at, h in places])
-            refused.append(f"Orders of the {name} onto which its marks fold mesh harmonics: {listed}.")
+    refused += _onto(lost)
     if not any(o.harmonic for o in orders):
         raise SignalError(
             f"lines: {trains[0].lines} and {trains[1].lines} marks show no mesh harmonic. {' '.join(refused)} Use "
@@ -92,19 +93,114 @@ def visible_orders(
 
 
 def _fine(gearing: Gearing, trains: Sequence[PulseTrain], harmonics: int) -> list[int]:
-    """Return the mesh harmonics from half the lines of an encoder on that it sees alone, on orders above the first."""
+    """Return the mesh harmonics from half the lines of an encoder on that no lower one falls upon, above order one."""
     fine = set(range(1, harmonics + 1))
     some = set()
     for train, mesh in zip(trains, (gearing.mesh, gearing.on_second(gearing.mesh))):
-        seen = np.array([folded(float(k * mesh), train.lines) for k in range(1, DARK * harmonics + 1)])
+        seen = np.array([folded(float(k * mesh), train.lines) for k in range(1, harmonics + 1)])
         for h in range(1, harmonics + 1):
             if h * mesh < Fraction(train.lines, 2):
                 continue
             some.add(h)
-            apart = np.abs(np.delete(seen[: DARK * h], h - 1) - seen[h - 1])
-            if seen[h - 1] < float(mesh) or apart.min() < SHADOW / max(train.turns, 1.0):
+            apart = np.abs(seen[: h - 1] - seen[h - 1])
+            if seen[h - 1] < float(mesh) or apart.min(initial=math.inf) < SHADOW / max(train.turns, 1.0):
                 fine.discard(h)
     return sorted(fine & some)
+
+
+def hidden_harmonics(gearing: Gearing, trains: Sequence[PulseTrain], orders: Sequence[Order]) -> list[list[Fraction]]:
+    """Return for each encoder the mesh orders that are not looked for and that it sees somewhere, folded or not.
+
+    Each where no order that is looked for, and no lower harmonic, is seen.
+
+    Parameters
+    ----------
+    gearing : Gearing
+    trains : sequence of PulseTrain
+    orders : sequence of Order
+        Those that are looked for.
+    """
+    asked = {o.order for o in orders}
+    found = []
+    for train, scale in zip(trains, (Fraction(1), gearing.ratio)):
+        width = SHADOW / max(train.turns, 1.0)
+        taken = np.array([0.0, *(folded(float(o * scale), train.lines) for o in asked), 0.5 * train.lines])
+        hidden = []
+        for h in range(1, HIDDEN_HARMONICS + 1):
+            order = h * gearing.mesh
+            seen = folded(float(order * scale), train.lines)
+            if order not in asked and np.abs(taken - seen).min() >= width:
+                hidden.append(order)
+                taken = np.append(taken, seen)
+        found.append(hidden)
+    return found
+
+
+def standing_harmonics(
+    gearing: Gearing, trains: Sequence[PulseTrain], orders: Sequence[Order], squares: Mapping[Fraction, float]
+) -> dict[Fraction, tuple[str, int]]:
+    """Return orders of the shafts that are later mesh harmonics by their height: whose marks fold which onto them.
+
+    Neither the shafts' run-out, below the mesh order, nor what modulates a mesh harmonic, next to it, is looked at.
+
+    Parameters
+    ----------
+    gearing, trains, orders
+        As for `hidden_harmonics`.
+    squares : mapping
+        Of the amplitudes of the orders.
+    """
+    found: dict[Fraction, tuple[str, int]] = {}
+    for name, train, scale in zip(("driver", "driven"), trains, (Fraction(1), gearing.ratio)):
+        mesh = gearing.mesh * scale
+        own = {o.order * scale: o for o in orders if o.harmonic is None and (o.order * scale).denominator == 1}
+        if mesh.denominator != 1 or not own:
+            continue
+        places = np.array([int(k) for k in own])
+        height = np.array([squares[o.order] for o in own.values()])
+        mine = {float(o.order * scale) for o in orders if o.harmonic}
+        for h in range(1, HIDDEN_HARMONICS + 1):
+            at = folded(float(h * mesh), train.lines)
+            order = own.get(Fraction(round(at)))
+            if order is None or at < mesh or h * mesh < Fraction(train.lines, 2) or order.order in found:
+                continue
+            if any(abs(at - m) <= MODULATED for m in mine):
+                continue
+            near = np.argsort(np.abs(places - at), kind="stable")[1 : NEAR + 1]
+            # squares of lines of chance are e-distributed: their median is ln 2 times their mean
+            level = float(np.median(height[near])) / math.log(2.0) if near.size >= NEAR // 2 else math.inf
+            if squares[order.order] > math.log(places.size / CHANCE) * level:
+                found[order.order] = name, h
+    return found
+
+
+def shadow(gearing: Gearing, trains: Sequence[PulseTrain], harmonic: int) -> int | None:
+    """Return the next mesh harmonic that the marks of either encoder fold onto one; None if that is far beyond."""
+    found = []
+    for train, mesh in zip(trains, (gearing.mesh, gearing.on_second(gearing.mesh))):
+        own = folded(float(harmonic * mesh), train.lines)
+        beyond = np.arange(harmonic + 1, FARTHEST_SHADOW * harmonic + 1)
+        half = 0.5 * train.lines
+        at = np.abs((beyond * float(mesh) + half) % train.lines - half)
+        found += list(beyond[np.abs(at - own) < SHADOW / max(train.turns, 1.0)][:1])
+    return int(min(found)) if found else None
+
+
+def folded_onto(standing: Mapping[Fraction, tuple[str, int]], gearing: Gearing) -> list[str]:
+    """Return what is refused of the orders that `standing_harmonics` found."""
+    lost: dict[str, list[tuple[float, int]]] = {"driver": [], "driven": []}
+    for order, (name, h) in standing.items():
+        lost[name].append((float(order if name == "driver" else gearing.on_second(order)), h))
+    return _onto(lost)
+
+
+def _onto(lost: Mapping[str, Sequence[tuple[float, int]]]) -> list[str]:
+    found = []
+    for name, places in lost.items():
+        if places:
+            listed = _shortened([f"{at:g} (harmonic {h})" for at, h in places])
+            found.append(f"Orders of the {name} onto which its marks fold mesh harmonics: {listed}.")
+    return found
 
 
 def _shortened(words: Sequence[str]) -> str:
@@ -117,5 +213,14 @@ LISTED = 12
 DARK = 7
 """A mesh harmonic is refused where one of up to so many times its number is folded onto it, and remarked on where one
 beyond is: amplitudes that fall as the number's square are then 2 % of it."""
+NEAR, MODULATED, CHANCE = 32, 2, 0.01
+"""Orders by which the level of one is told; those next to a mesh harmonic that the shafts' turns may modulate; and the
+probability that chance makes one of all orders stand as high."""
+HIDDEN_HARMONICS = 64
+"""Mesh harmonics that are taken out where they are not looked for: of contact forces later ones are below 1/4000 of the
+first, of which uneven marks of 1 % leak a hundredth into others."""
+FARTHEST_SHADOW = 30
+"""Times a harmonic's number up to which those that fall upon it are looked for: of amplitudes that fall as the number's
+square a later one is below a thousandth."""
 SHADOW = 2.0
 """Width of a line, at most, by the reciprocal of the turns: nearer orders are not parted."""

@@ -39,7 +39,7 @@ from gearmbs.signals.files.text_tables import (
     pointed,
     split_cells,
 )
-from gearmbs.signals.signal.labels import FEWEST_EVEN, role_of
+from gearmbs.signals.signal.labels import FEWEST_EVEN, rises_evenly, role_of
 from gearmbs.signals.signal.record import (
     REMEDY,
     Progress,
@@ -352,6 +352,13 @@ def _record(
             dropped.add(layout.index)
             notes.append(meaning)
             clock = seconds if seconds is not None else clock
+            if clock is None and values.shape[1] - len(dropped) > 1 and 1 not in dropped:
+                # beside the numbers of the rows
+                times = values[:, 1]
+                if len(times) >= FEWEST_EVEN and rises_evenly(times) and not np.all(np.diff(times) == 1.0):
+                    dropped.add(1)
+                    notes.append("The second column rises evenly; it is taken for the time in s.")
+                    clock = times
     rate: float | None = None
     said: list[str] = []
     if clock is not None and len(clock) > 1:

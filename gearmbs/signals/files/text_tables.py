@@ -35,7 +35,7 @@ GAP_CELLS = frozenset(
     {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf"}
 )
 DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4})"
-CLOCK = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?"
+CLOCK = r"(?:\d+ days? )?\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?"
 STAMPS: tuple[tuple[str, re.Pattern[str]], ...] = (
     ("stamp", re.compile(rf"^{DATE}[T ]{CLOCK}$")),
     ("date", re.compile(rf"^{DATE}$")),
@@ -121,18 +121,21 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         kinds = kinds[::2]
         notes.append(f"{seen}: each second comma is read as that of a number, {pointed(head[first]).strip()[:60]!r}.")
     width = len(kinds)
-    labels, header_line = _labels(head[:first], separator, width)
+    head = ["" if _tells_types(line, separator) else line for line in head[:first]]
+    labels, header_line = _labels(head, separator, width)
     units_row = None
     bare = [name_and_unit(label) for label in labels] if labels else []
     if labels and header_line is not None:
-        units_row = _units_row(head[:first], separator, width, labels, header_line)
+        units_row = _units_row(head, separator, width, labels, header_line)
     if units_row is not None:
         names, units = units_row
     else:
         names = [name for name, _ in bare] or [f"ch{i + 1}" for i in range(width)]
         units = [unit for _, unit in bare] or [UNKNOWN_UNITS] * width
     stamps = tuple(i for i, kind in enumerate(kinds) if kind in ("stamp", "date", "clock"))
-    empty = tuple(i for i, kind in enumerate(kinds) if kind == "gap" and i == width - 1 and not names[i].strip())
+    empty = tuple(
+        i for i, kind in enumerate(kinds) if kind == "gap" and i == width - 1 and not (labels and names[i].strip())
+    )
     if units[0].lower() in ("", UNKNOWN_UNITS) and names[0].strip().lower() in TIME_UNITS:
         names, units = ["time", *names[1:]], [names[0].strip(), *units[1:]]
     clock = stamps[0] if stamps else next((i for i, (n, u) in enumerate(zip(names, units)) if tells_time(n, u)), None)
@@ -150,7 +153,7 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         decimal,
         unique_names(names) if labels else names,
         units,
-        _metadata(head[:first], separator, header_line),
+        _metadata(head, separator, header_line),
         clock,
         stamps,
         index if index != clock else None,
@@ -158,6 +161,17 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         notes,
         headings > 1,
     )
+
+
+TYPES = re.compile(
+    r"(dt_)?(double|float|single|real|numeric|number|u?int(eger)?|bool(ean)?|string|r[48])[_ ]?(8|16|32|64)?"
+)
+
+
+def _tells_types(line: str, separator: str | None) -> bool:
+    """Whether a line says how the numbers of its columns are stored."""
+    cells = [cell.lower() for cell in split_cells(line, separator)]
+    return len(cells) > 1 and all(TYPES.fullmatch(cell) for cell in cells)
 
 
 def cell_kind(cell: str, decimal: str) -> Kind:
@@ -293,9 +307,9 @@ def _labels(above: list[str], separator: str | None, width: int) -> tuple[list[s
 def _units_row(
     above: list[str], separator: str | None, width: int, labels: list[str], line: int
 ) -> tuple[list[str], list[str]] | None:
-    """Names and units where the units stand in a row of their own below the names, else None.
+    """Names and units where the units stand in a row of their own, else None.
 
-    Units are in brackets, or plain where the names above begin with the time's.
+    Units are in brackets, or plain where the names above begin with the time's; or all of them above the names.
     """
     rows = [text for text in above[:line] if text.strip() and not COMMENT.match(text)]
     upper = split_cells(rows[-1], separator) if rows else []
@@ -307,6 +321,9 @@ def _units_row(
     ):
         return upper, [(m.group(1).strip() if m else "") or UNKNOWN_UNITS for m in in_brackets]
     plain = [label.strip() for label in labels]
+    if len(upper) == width and all(map(is_unit_of_column, upper)) and not any(map(is_unit_of_column, plain)):
+        # units above the names
+        return plain, upper
     stated = plain[0] and all(not unit or is_unit_of_column(unit) for unit in plain)
     # of a row of units alone the names above need not begin with the time's
     if (
@@ -391,7 +408,7 @@ class Times:
         for column in stamped.columns[1:]:
             texts = texts + " " + stamped[column].astype(str).str.strip().str.strip('"')
         texts = texts.str.replace(",", ".", regex=False)
-        if re.match(r"^\d{1,2}:", texts.iloc[0]):
+        if re.match(r"^(\d+ days? )?\d{1,2}:", texts.iloc[0]):
             seconds = self._of_clocks(texts)
         else:
             seconds = self._of_dates(texts)

@@ -33,7 +33,8 @@ WEAK_RATE_NAMES = frozenset({"rate"})
 """Names that mean the sampling rate in some files and the shaft's in others: a better name beside them wins."""
 STEP_NAMES = frozenset(
     (
-        "xinc xincrement xincr xdelta dx deltax dt deltat deltatime timestep timeincrement timeinterval wfincrement "
+        "xinc xincrement xincr xdelta dx deltax dt deltat deltatime tinterval timestep timeincrement timeinterval "
+        "wfincrement "
         "sampleinterval samplinginterval sampleperiod samplingperiod samplingtime tsample tsamp abtastintervall "
         "abtastzeit abtastschritt zeitschritt periodavzorkovani vzorkovaciperioda periodedechantillonnage pasdetemps"
     ).split()

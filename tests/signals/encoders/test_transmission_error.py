@@ -541,3 +541,52 @@ def test_run_out_alone_accuses_no_tooth():
     angles = coupled(wrong_tooth(10e-6, size=0.0), (21, 34), radius, turns=48)
     found = transmission_error_from_pulses(Discs(error=1e-4).run(angles), (21, 34), base_radius=radius)
     assert not any(found.tooth_errors(shaft)["stands_out"].any() for shaft in ("driver", "driven"))
+
+
+SET = {"ratio": Fraction(9, 2), "mesh_order": Fraction(28, 3)}
+"""Of a planetary set, sun to carrier: 12, 15 and 42 teeth."""
+
+
+def planetary_motion(amplitudes, turns):
+    """Angles of sun and carrier for mesh harmonics by number, m, and the lag over meshes from the beginning."""
+
+    def lag(turned):
+        return sum(a * np.cos(math.tau * h * turned * 28 / 3 + h) for h, a in amplitudes.items())
+
+    return coupled(lag, (2, 9), 0.02, turns=turns), lambda cycle: lag(cycle * 3 / 28)
+
+
+def noiseless(angles, lines, share=0.02):
+    """Trains of both shafts in mesh and free, marks off by a share of the pitch, and nothing else."""
+    marks = [mark_errors(lines, share, seed(11) + k) for k in (0, 1)]
+    still = free(seconds=0.5)
+    return (
+        [encoder(a, lines, marks=m, index=True, mounted=0.3 * k, name=name) for a, m in zip(pair, marks)]
+        for k, name, pair in ((1, "in mesh", angles), (0, "free", (still, still)))
+    )
+
+
+def test_harmonics_beyond_half_the_lines_leave_nothing_in_those_below():
+    """Of a carrier's 200 lines two harmonics are below half; 3, 4 and 7, larger, fold onto its orders 74, 32 and 94."""
+    amplitudes = {1: 3e-7, 2: 1e-7, 3: 2e-6, 4: 1e-6, 7: 5e-7}
+    angles, _ = planetary_motion(amplitudes, 36)
+    trains, alone = noiseless(angles, 200)
+    found = transmission_error_from_pulses(
+        CoupledRun(*trains), base_radius=0.02, free=dict(zip(("driver", "driven"), alone)), **SET
+    )
+    mesh = found.harmonics()
+    assert mesh["harmonic"].tolist() == [1, 2]
+    # as lines of the orders that they are folded to they would leave 2 um 2 pi 0.02/sqrt(200) = 18 nm
+    assert np.allclose(mesh["amplitude"], [3e-7, 1e-7], atol=1e-9)
+
+
+def test_a_mesh_cycle_of_a_planetary_set_begins_at_mark_0_of_the_sun():
+    angles, lag = planetary_motion({1: 3e-6, 2: 1e-6}, 36)
+    trains, alone = noiseless(angles, 200)
+    found = transmission_error_from_pulses(
+        CoupledRun(*trains), base_radius=0.02, free=dict(zip(("driver", "driven"), alone)), **SET
+    )
+    phase, error = found.mesh_cycle()
+    # the sun is mounted at 0.3 rad, and any of its turns may be the first
+    begins = [28 / 3 * (0.3 / math.tau + turn) for turn in range(3)]
+    assert min(np.abs(error - lag(phase + begin)).max() for begin in begins) < 5e-9

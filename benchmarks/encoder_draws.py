@@ -1,0 +1,73 @@
+"""How often intervals of encoders without known marks cover the truth: a table of docs/theory/angle_measurement.md.
+
+    python -m benchmarks.encoder_draws --write docs/data/encoder_draws.txt
+
+Takes some minutes of one core. Of each gearbox the exact pulses are made once; marks are errors of some microradians,
+over which the speed is constant, so that each draw moves the pulses by its marks' errors over the speed there.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import gearmbs as gm
+from benchmarks.instruments import COUNTER, LINES, MARKS, boxes
+from benchmarks.long_records import Steady
+from benchmarks.markdown import table
+from gearmbs import signals
+
+DRAWS = 200
+SECONDS = 1.0
+"""Of each record: marks do not average out, so that longer ones have the same intervals."""
+HARMONICS = 4
+PROBABILITY = 0.95
+
+
+def covered(steady: Steady, draws: int = DRAWS, seconds: float = SECONDS, **known: Any) -> np.ndarray:
+    """Return in how many draws of both discs the intervals of the first mesh harmonics hold the true ones."""
+    exact = steady.exact(HARMONICS)
+    plain = [steady.plain(shaft, seconds) for shaft in (0, 1)]
+    slope = [np.gradient(train.times, np.arange(train.times.size)) * LINES / (2.0 * np.pi) for train in plain]
+    inside = np.zeros(HARMONICS, dtype=int)
+    for draw in range(draws):
+        trains = []
+        for shaft, train in enumerate(plain):
+            marks = signals.mark_errors(LINES, MARKS, 2 * draw + shaft)
+            rng = np.random.default_rng((draw, shaft))
+            times = train.times + slope[shaft] * marks[train.numbers % LINES]
+            times = times + gm.units.to_si(COUNTER["jitter"], "time") * rng.standard_normal(times.size)
+            tick = gm.units.to_si(COUNTER["clock"], "time")
+            trains.append(signals.PulseTrain(np.floor(times / tick) * tick, train.numbers, LINES, True, train.name))
+        found = gm.transmission_error_from_pulses(
+            signals.CoupledRun(*trains), base_radius=steady.radius, probability=PROBABILITY, **steady.gearing, **known
+        ).harmonics()[:HARMONICS]
+        inside += ((found["low"] <= exact) & (exact <= found["high"])).to_numpy()
+    return inside
+
+
+def page() -> str:
+    """Return the table."""
+    rows = []
+    for box in boxes():
+        steady = Steady.of_box(box)
+        for name, known in (("the record", {}), ("what is told", {"mark_error": MARKS})):
+            inside = covered(steady, **known)
+            rows.append([box.name, name, ", ".join(map(str, inside))])
+            print(rows[-1], flush=True)
+    return table(
+        ["", "level of the marks by", f"of {DRAWS} intervals of harmonics 1 to {HARMONICS} hold the truth"], rows
+    )
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", type=Path)
+    given = parser.parse_args()
+    text = page()
+    print(text)
+    if given.write is not None:
+        given.write.write_text(text, encoding="utf-8")
