@@ -1,8 +1,8 @@
 """What it costs to step a simulation: points 0.1 ms apart against one run with them as outputs, inputs set at each of
-them, and states in and out.
+them, and states in and out; and what integrators do for it.
 
 ``OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python -m benchmarks.stepping``: smallest processor times of interleaved
-repetitions.
+repetitions, one after another in an order that changes: a run finds caches as the one before has left them.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ import numpy as np
 import gearmbs as gm
 from benchmarks.markdown import number, table
 from benchmarks.timing import seconds_per_call
+from gearmbs.dae.result import SolverStats
+from gearmbs.gears import GearSpec, PlanetarySet, planetary_mechanism
 from gearmbs.mechanism import Mechanism
 from gearmbs.studies.presets.bench import bench_train
 from gearmbs.studies.run.simulation import case_mechanism
@@ -27,6 +29,19 @@ REPEATS = 15
 STATES = 200
 SWING = 20.0
 """Of the inputs, Hz."""
+
+
+TRAIN = {"tol": 1e-6, "rate_scale": 3000.0}
+COUNTS = ("steps", "error_rejections", "newton_rejections", "residuals", "jacobians", "factorizations", "solves")
+KINDS = {"held, 50 %": (0.5, 0), "held, 1 %": (0.01, 0), "held, 1e-6": (1e-6, 0), "led, 50 %": (0.5, 1)}
+"""Parts of the torque by which inputs swing, and how they are held."""
+
+
+def planets() -> Mechanism:
+    """Return a planetary set of four planets whose meshes are forces given by equations."""
+    wheels = GearSpec(28, "2 mm"), GearSpec(36, "2 mm"), GearSpec.ring(100, "2 mm")
+    gears = PlanetarySet(*wheels, planets=4, ideal=(1e8, 1e8))
+    return planetary_mechanism(gears, speeds={"sun": 50.0}, torques={"carrier": -20.0}, run_up=0.01)
 
 
 def _stepped(m: Mechanism, times: np.ndarray, records: bool, options: dict[str, Any]) -> None:
@@ -47,37 +62,41 @@ def stepping_costs(m: Mechanism, span: float, **options: Any) -> dict[str, float
     return _least(kinds)
 
 
-def input_costs(m: Mechanism, body: str, torque: float, span: float, **options: Any) -> dict[str, float]:
+def input_costs(
+    m: Mechanism, body: str, torque: float, span: float, **options: Any
+) -> tuple[dict[str, float], dict[str, SolverStats]]:
     """Return processor seconds of one run, and of steps with a further torque set at each, held or led.
 
-    It swings at 20 Hz by half of ``torque`` (N m), and by a hundredth.
+    It swings at 20 Hz by half of ``torque`` (N m), by a hundredth, and by so little that nothing is to be resolved.
+    With them come the statistics of each.
     """
     m.torque("swing", m.bodies[body], m.input("swing", "N m"))
     times = np.linspace(0.0, span, round(span * RATE) + 1)
     swing = torque * np.sin(2.0 * np.pi * SWING * times)
+    stats: dict[str, SolverStats] = {}
 
-    def steered(part: float, hold: int) -> None:
+    def steered(kind: str) -> None:
+        part, hold = KINDS[kind]
         sim, values = gm.Simulator(m, span, **options), (part * swing).tolist()
         for k, t in enumerate(times[1:].tolist()):
             sim.set("swing", values[k + hold], hold)
             sim.advance(t)
+        if kind not in stats:
+            stats[kind] = sim.solution().stats
 
-    kinds: dict[str, Callable[[], Any]] = {
-        "one run": partial(m.simulate, span, t_eval=times, **options),
-        "held, 50 %": partial(steered, 0.5, 0),
-        "held, 1 %": partial(steered, 0.01, 0),
-        "led, 50 %": partial(steered, 0.5, 1),
-    }
-    return _least(kinds)
+    stats["one run"] = m.simulate(span, t_eval=times, **options).stats
+    kinds: dict[str, Callable[[], Any]] = {"one run": partial(m.simulate, span, t_eval=times, **options)}
+    return _least(kinds | {kind: partial(steered, kind) for kind in KINDS}), stats
 
 
 def _least(kinds: dict[str, Callable[[], Any]]) -> dict[str, float]:
     """Return the smallest processor times of interleaved repetitions, s."""
-    best = dict.fromkeys(kinds, np.inf)
+    best, order = dict.fromkeys(kinds, np.inf), np.random.default_rng(0)
     for _ in range(REPEATS):
-        for name, call in kinds.items():
+        for k in order.permutation(len(kinds)):
+            name = list(kinds)[k]
             begin = time.process_time()
-            call()
+            kinds[name]()
             best[name] = min(best[name], time.process_time() - begin)
     return best
 
@@ -100,13 +119,14 @@ def state_costs(m: Mechanism, at: float, **options: Any) -> dict[str, float]:
 
 
 def main() -> None:
-    """Measure the healthy pair and the bench's drivetrain, and print two tables."""
-    models: dict[str, tuple[Mechanism, float, dict[str, Any]]] = {
-        "healthy pair": (case_mechanism(gm.Case()), 0.1, {"tol": 1e-7, "rate_scale": 3000.0}),
-        "drivetrain": (bench_train().build(), 0.05, {"tol": 1e-6, "rate_scale": 3000.0}),
+    """Measure the healthy pair, the bench's drivetrain and a planetary set, and print three tables."""
+    models: dict[str, tuple[Mechanism, str, float, float, dict[str, Any]]] = {
+        "healthy pair": (case_mechanism(gm.Case()), "shaft 2", 100.0, 0.1, {"tol": 1e-7, "rate_scale": 3000.0}),
+        "drivetrain": ((train := bench_train().build()), list(train.bodies)[-1], 100.0, 0.05, TRAIN),
+        "planetary set": (planets(), "carrier", 20.0, 0.05, {"tol": 1e-5}),
     }
     rows = []
-    for name, (m, span, options) in models.items():
+    for name, (m, _, _, span, options) in models.items():
         costs, states = stepping_costs(m, span, **options), state_costs(m, 0.2 * span, **options)
         one = costs["one run"]
         ratios = [number(costs[kind] / one, 3) for kind in ("no outputs", "stepped", "no records")]
@@ -116,13 +136,14 @@ def main() -> None:
     heads = ["model", "one run, ms", "no outputs", "stepped", "no records", "state, us", "restore, us"]
     heads += ["state / 0.1 ms of the run", "restore / 0.1 ms of the run"]
     print(table(heads, rows))
-    rows, heads = [], ["model", "one run, ms"]
-    for name, (m, span, options) in models.items():
-        costs = input_costs(m, {"healthy pair": "shaft 2"}.get(name, list(m.bodies)[-1]), 100.0, span, **options)
+    rows, counted, heads = [], [], ["model", "one run, ms", *KINDS]
+    for name, (m, body, torque, span, options) in models.items():
+        costs, stats = input_costs(m, body, torque, span, **options)
         one = costs.pop("one run")
-        heads[2:] = list(costs)
         rows.append([name, number(1e3 * one, 3), *(number(cost / one, 3) for cost in costs.values())])
+        counted += [[name, kind, *(str(getattr(done, count)) for count in COUNTS)] for kind, done in stats.items()]
     print(table(heads, rows))
+    print(table(["model", "run", *COUNTS], counted))
 
 
 if __name__ == "__main__":

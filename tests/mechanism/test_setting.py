@@ -193,6 +193,55 @@ def test_one_input_or_two():
     np.testing.assert_array_equal(ends[0].input("load"), ends[1].input("load"))
 
 
+def test_steps_land_where_an_input_jumps_at_each_point():
+    """From the third such point on; where nothing is set they pass points again, but for the first."""
+    sim, ends = gm.Simulator(two_discs(), 1.0), []
+    for k in range(40):
+        if k < 20 or k > 30:
+            sim.set("load", 5.0 + (-1.0) ** k)
+        sim.advance(1.7e-3 * (k + 1))
+        ends.append(sim._run.state.t - sim.t)
+    landed = np.array(ends) == 0.0
+    assert landed[3:20].all()
+    assert not landed[21:31].any()
+    assert landed[34:].all()
+
+
+@pytest.mark.parametrize("hold", [0, 1])
+def test_the_answer_to_an_input_is_found_once_for_each_matrix(hold):
+    """Equations are evaluated for a change of the input only where their matrix has been since the last one."""
+    sim = gm.Simulator(two_discs(), 1.0, tol=1e-9)
+    state, evaluated, matrices, values = sim._run.state, [], [], np.random.default_rng(7).normal(size=60)
+    for k in range(60):
+        sim.set("load", values[k], hold)
+        before = state.residuals
+        if k > 0:
+            assert sim._steer(1e-3 * (k + 1))
+        evaluated.append(state.residuals - before)
+        matrices.append(state.jacobians)
+        sim.advance(1e-3 * (k + 1))
+    again = np.flatnonzero(np.diff(matrices) == 0) + 1
+    again = again[again > 5]
+    assert again.size > 20
+    assert not np.array(evaluated)[again].any()
+
+
+def test_an_input_that_acts_by_its_square():
+    """2 w' = u^2, with values of both signs and of any size."""
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    pin = m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    m.input("u", "N m")
+    m.axis_torque("drive", pin.i, pin.j, "u**2")
+    u = np.random.default_rng(3).normal(size=100) * 10.0 ** (np.arange(100) % 4 - 2)
+    sim, speed = gm.Simulator(m, 1.0, tol=1e-9), []
+    for k, value in enumerate(u.tolist()):
+        sim.set("u", value)
+        sim.advance(1e-3 * (k + 1))
+        speed.append(sim.get("angular_velocity", "disc")[2])
+    np.testing.assert_allclose(speed, 0.5e-3 * np.cumsum(u**2), rtol=0, atol=1e-7)
+
+
 class PI:
     """A controller of the speed of a disc that can tell what it remembers, and be told."""
 

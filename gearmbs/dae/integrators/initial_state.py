@@ -147,7 +147,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.step_in_weights = bool((st.tested > st.coupled).any())
     st.t = t0
     st.order = 1
-    st.worst_row = st.jumped = st.pole = st.leapt = st.turned = -1
+    st.worst_row = st.jumped = st.pole = st.leapt = st.turned = st.answered = -1
     st.since_refused = KINK_MEMORY
     st.n_past = 1
     st.gamma_factored = 1.0

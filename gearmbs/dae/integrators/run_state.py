@@ -44,6 +44,8 @@ WINDOW = 4 * HISTORY
 KINK_MEMORY = 64
 """Steps after a refused one for which derivatives of the solution count as jumping; see `controller.meets_kinks`."""
 
+ANSWER = 4
+"""Vectors of the answer to a change of an input, see `gearmbs.dae.integrators.stepping.jumps`."""
 MAX_NODES = 2 * HISTORY
 """Length of the vectors that hold coefficients of a step."""
 
@@ -80,6 +82,8 @@ class RunState(Struct):
         1 for algebraic unknowns that equations without derivatives determine, else 0.
     value, slope, nodes, respacing : ndarray, shape (MAX_NODES,), and (HISTORY, MAX_NODES) for the last
         Coefficients: of interpolation for values and slopes, times of points, weights of re-interpolation.
+    answer : ndarray, shape (ANSWER * n,)
+        Answer of the linear equations to a unit of an input, see `gearmbs.dae.integrators.stepping.jumps`.
     jac, jac_slope, matrix : ndarray
         CSC values: the Newton matrix at its last evaluation, its derivative dG/dy' by the leading coefficient, and the
         matrix carried over to the current leading coefficient, which is the one that is factored.
@@ -157,6 +161,12 @@ class RunState(Struct):
     turn_moves: float  # tolerances that points move by for a turn of one, at the reach of the points then
     turn_reach: float
     turns_trusted: int  # turns since that was found
+    answered: int  # place of the input whose answer is at hand, -1 for none
+    answer_change: float  # of the input from which it was found
+    answer_gamma: float  # leading coefficient of its series
+    answer_jacobians: int  # evaluations of the matrix until then
+    asked: float  # communication point that a held run goes to, -inf behind a jump until the next one is asked for
+    jumps_in_turn: int  # communication points in a row at which the equations have jumped
     # the open step
     open: bool  # its row is taken
     t_old: float
@@ -256,6 +266,7 @@ class RunState(Struct):
     slope: Vector
     nodes: Vector
     respacing: Matrix
+    answer: Vector
     jac: Vector
     jac_slope: Vector
     matrix: Vector
@@ -346,6 +357,7 @@ def state_layout(sizes: Sizes) -> BlockLayout[RunState]:
             **dict.fromkeys(PER_ENTRY, sizes.nnz),
             **dict.fromkeys(COEFFICIENTS, MAX_NODES),
             "respacing": (HISTORY, MAX_NODES),
+            "answer": ANSWER * n,
             **dict.fromkeys(("g_old", "event_left"), max(1, sizes.events)),
             "idata": sizes.idata,
             "rdata": sizes.rdata,

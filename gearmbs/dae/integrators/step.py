@@ -77,6 +77,16 @@ LANDED = 0.999
 """Fraction of the size wanted below which a step counts as shortened to land on a stop."""
 
 
+IN_TURN = 2
+"""Communication points in a row with a jump from which on steps land on the next one."""
+CLOSE = 0.05
+"""Part of the step before below which the point of a jump replaces the one behind it, and no step lands: differences
+over a shorter distance would amplify what the polynomial through both is off by."""
+STRETCH = 1.1
+"""Ratio to the step wanted by which equal steps may be longer so that fewer of them land on a communication point.
+With 1.05, 1.1, 1.2 and 1.35 the pair takes 8500, 8638, 8994 and 9531 residuals for a thousand points."""
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def open_step(st):
     """Take a row of the history for the next step, unless one is open already.
@@ -124,6 +134,24 @@ def fitted_end(h, t, stop):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def lands(st, t, h_min, stop):
+    """Return whether steps from ``t`` land on the communication point that is gone to.
+
+    A held run goes past it, and is cut back where an input is set there. Where that was so at the last points it is
+    going to be so again, most likely.
+    """
+    way = st.asked - t
+    return st.jumps_in_turn >= IN_TURN and st.asked <= stop and way > CLOSE * st.h and way > h_min
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def landing_end(h, t, stop, stretch):
+    """Return the end of the first of equal steps that land on ``stop``: as few as are at most ``stretch * h`` long."""
+    count = np.ceil((stop - t) / (stretch * h))
+    return stop if count <= 1.0 else t + (stop - t) / count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def choose_end(st):
     """Choose end, size and order of the attempt, and set the weights of its tests.
 
@@ -149,7 +177,11 @@ def choose_end(st):
             wanted = min(wanted, 0.5 * (stop - t_old))
     if not st.interpolate and st.next_output < st.outputs.shape[0]:
         stop = min(stop, st.outputs[st.next_output])
-    t = fitted_end(wanted, t_old, stop)
+    if lands(st, t_old, h_min, stop):
+        t = landing_end(wanted, t_old, st.asked, STRETCH if other_fails == 0 else 1.0)
+        stop = st.asked
+    else:
+        t = fitted_end(wanted, t_old, stop)
     if t - t_old < h_min and t < stop and st.h_refused > (1.0 + 1e-9) * h_min:
         st.h = h_min
         t = fitted_end(h_min, t_old, stop)
@@ -459,7 +491,9 @@ def choose_next(st):
         after_success(st)
     if landed and st.h >= h:
         # shortened only to land: go on with the size the error test had asked for
-        st.h = min(h_wanted, 2.0 * st.h) if st.interpolate else h_wanted
+        before = min(h_wanted, 2.0 * st.h) if st.interpolate else h_wanted
+        # a step is shorter at most points where they are landed on, and has to grow nevertheless
+        st.h = max(st.h, before) if st.jumps_in_turn >= IN_TURN else before
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

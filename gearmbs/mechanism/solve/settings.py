@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.dae.integrators.stepping.jumps import ON_LINE
+from gearmbs.dae.integrators.stepping.jumps import CHANGED, LED, ON_LINE
 from gearmbs.dae.problem import INPUT, ModelError, Number, cells_of
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.wording import did_you_mean
@@ -155,6 +155,27 @@ class Settings:
         led = [name for name, (_, hold) in self.waiting.items() if hold]
         led += [name for name, end in self.led.items() if end > t and name not in self.waiting]
         return led[0] if led else None
+
+    def steered(self) -> tuple[str, float, int, int, int] | None:
+        """Return the one plain input that waits, and no line of another one may end: name, value, hold and places."""
+        waiting, led = self.waiting, self.led
+        if len(waiting) != 1:
+            return None
+        ((name, (value, hold)),) = waiting.items()
+        places = self.plain.get(name)
+        if places is None or (led and (len(led) > 1 or name not in led)):
+            return None
+        return name, value, hold, *places
+
+    def take_steered(self, name: str, code: int, held: np.ndarray, end: float) -> None:
+        """Note that it has been steered, with what `jumps.steer` has returned and left."""
+        self.waiting.clear()
+        if code & CHANGED:
+            self.held = held
+        if code & LED:
+            self.led[name] = end
+        elif self.led:
+            self.led.clear()
 
     def take(self, t: float, end: float) -> Change | None:
         """Return what changes at ``t``, None for nothing; lines that begin there end at ``end``."""

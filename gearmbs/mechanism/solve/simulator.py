@@ -16,7 +16,6 @@ from gearmbs._lazy import Guessed, uncollected
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
-from gearmbs.dae.integrators.stepping.jumps import CHANGED, LED
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.model.system import settle_states
 from gearmbs.dae.problem import DAEProblem, ModelError, Number
@@ -278,13 +277,14 @@ class Simulator(Sampled, Restored, Guessed):
         own = self.__dict__
         if own["_plain"] and type(t) is float and own["t"] < t <= own["t_end"] and own["_failed"] is None:
             # as below, by one call of compiled code
-            settings = own["_settings"]
-            if settings.waiting or settings.led:
-                if t - own["t"] < RESOLVED * own["t_end"] or not self._steer(t):
-                    return self._advance(t, record)
-            run, keep = own["_run"], record and own["_records"]
+            settings, run, keep = own["_settings"], own["_run"], record and own["_records"]
             rows, row, began = run.rows, run.row, perf_counter()
-            failure = run.go_to(t, keep)
+            if settings.waiting or settings.led:
+                if t - own["t"] < RESOLVED * own["t_end"] or (done := self._steer_to(t, keep)) is None:
+                    return self._advance(t, record)
+                (failure,) = done
+            else:
+                failure = run.go_to(t, keep)
             own["_took"] += perf_counter() - began
             if failure is not None:
                 self._fail(failure)
@@ -542,28 +542,30 @@ class Simulator(Sampled, Restored, Guessed):
     def _steer(self, end: float) -> bool:
         """Let what has been set take effect in one compiled call, where it is one input of loads; return that."""
         own = self.__dict__
-        settings, waiting, led = own["_settings"], own["_settings"].waiting, own["_settings"].led
-        if len(waiting) != 1:
+        settings, point, began = own["_settings"], own["_point"], perf_counter()
+        if (one := settings.steered()) is None:
             return False
-        ((name, (value, hold)),) = waiting.items()
-        places = settings.plain.get(name)
-        # and no line of another one may end
-        if places is None or (led and (len(led) > 1 or name not in led)):
-            return False
-        point, began = own["_point"], perf_counter()
-        done = own["_run"].steer(point, *places, value, end if hold else point[0], settings.held.size)
+        name, value, hold, first, count = one
+        done = own["_run"].steer(point, first, count, value, end if hold else point[0], settings.held.size)
         if done is None:
             return False
-        waiting.clear()
-        code, held = done
-        if code & CHANGED:
-            settings.held = held
-        if code & LED:
-            led[name] = end
-        elif led:
-            led.clear()
+        settings.take_steered(name, *done, end)
         own["_took"] += perf_counter() - began
         return True
+
+    def _steer_to(self, t: float, keep: bool) -> tuple[tuple[Status, str] | None] | None:
+        """Do the same and go on to ``t`` in that call; return what `HeldRun.go_to` does, None where it cannot be."""
+        own = self.__dict__
+        settings, point = own["_settings"], own["_point"]
+        if (one := settings.steered()) is None:
+            return None
+        name, value, hold, first, count = one
+        done = own["_run"].steer_to(point, first, count, value, t if hold else point[0], settings.held.size, t, keep)
+        if done is None:
+            return None
+        code, held, failure = done
+        settings.take_steered(name, code, held, t)
+        return (failure,)
 
     def _start_with(self, values: np.ndarray) -> None:
         """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""

@@ -78,6 +78,15 @@ def test_the_end_of_a_step_leaves_no_sliver(h, stop, end):
     assert step.fitted_end(h, 1.0, stop) == pytest.approx(end, rel=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("h", "end"),
+    [(0.3, 1.1), (0.1, 1.1), (0.095, 1.1), (0.085, 1.05), (0.06, 1.05), (0.04, 1.0 + 0.1 / 3.0), (0.02, 1.02)],
+)
+def test_steps_that_land_are_equal_and_as_few_as_the_error_allows(h, end):
+    """On 1.1 from 1, each a tenth longer than wanted at most."""
+    assert step.landing_end(h, 1.0, 1.1, 1.1) == pytest.approx(end, rel=1e-12)
+
+
 def test_a_step_lands_on_the_next_stop():
     run = warm(breakpoints=[0.5])
     st = run.state

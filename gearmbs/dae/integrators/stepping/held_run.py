@@ -32,7 +32,7 @@ from gearmbs.dae.integrators.stepping.memory import (
     words_of,
 )
 from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, stand_behind
-from gearmbs.dae.integrators.stepping.standing import Standing, go_on, pack, steer_on, unpack
+from gearmbs.dae.integrators.stepping.standing import Standing, go_on, pack, steer_and_go_on, steer_on, unpack
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
@@ -135,13 +135,14 @@ class HeldRun(Run):
         """Steps, time and point behind which numbers of the equations have changed."""
         self._scratch = np.empty((TERMS + 3, problem.n))
         self._pass_jump, self._go_on, self._steer_on = direct(pass_jump), direct(go_on), direct(steer_on)
+        self._steer_and_go_on = direct(steer_and_go_on)
         self._pack, self._unpack = direct(pack), direct(unpack)
         self.itself = ref(self)
         self.crossings: list[tuple[float, int]] = []
         """Times and events in the last step."""
         self._errors = options.errors
-        self._watched = False
-        """Whether ``stall`` may have noted something."""
+        self._watched = self._quick = False
+        """Whether ``stall`` may have noted something; whether nothing but steps may come on the way to a time."""
         self._make_rows()
         self.layout, numbers = laid_out(self)
         nothing = np.zeros(0, dtype=np.int64)
@@ -167,6 +168,7 @@ class HeldRun(Run):
     def _find_factors(self) -> None:
         """Find the place of the factors, which pivots that are chosen anew change."""
         plan, factors = self.plan, self.factors
+        self._quick = self.started and not self.state.n_events and self._errors is None
         if factors is not self._placed and factors is not None and plan is not None:
             standing, self._placed = self._standing, factors
             standing.plan, standing.factors = ctypes.addressof(plan), ctypes.addressof(factors)
@@ -223,17 +225,29 @@ class HeldRun(Run):
         Some steps are taken at once, whatever else there is to do, for which Python takes as long as they do. Ctrl-C
         comes in between then, after them: ``st.code`` knows what is left to do.
         """
-        st, row, code = self.state, self.row, NOT_BEGUN
-        if self.started:
-            if self.crossings and t > st.t:
+        row, code = self.row, NOT_BEGUN
+        if self._quick:
+            code = self._go_on(self.functions, self._at, t, row, self._look_at)
+            if code == REACHED and row + 2 < self._count:
+                # as `_arrive` does, at most points
+                self.table = self.last_records.table
+                if keep:
+                    self._first = self.row = row + 1
+                else:
+                    self.row = self._first + 1 if row == self._first else self._first
+                return None
+        elif self.started:
+            if self.crossings and t > self.state.t:
                 self.crossings.clear()
             code = self._go_on(self.functions, self._at, t, row, self._look_at)
+        return self._arrive(code, t, row, keep)
+
+    def _arrive(self, code: int, t: float, row: int, keep: bool) -> tuple[Status, str] | None:
+        """Do what is left to do after a compiled call on the way to a time, by what it has returned; see `go_to`."""
+        st = self.state
         if code == REACHED and not self._errors:
             self.table = self.last_records.table
-            if keep and row + 2 < self._count:
-                self._first = self.row = row + 1
-            else:
-                self._stand(keep)
+            self._stand(keep)
             return None
         if code == NOT_BEGUN and self.started and t <= st.t:
             self._write_within(t)
@@ -400,12 +414,8 @@ class HeldRun(Run):
         (int, ndarray) or None
             The code, and what stands in the cells then; None where that has to be done by `change`.
         """
-        st = self.state
-        steps, given = st.steps, self._given
-        if not steps or st.n_events:
-            return None
-        told = self.last_records.changed_at == steps or (given is not None and given[0] == steps)
-        if told and not np.array_equal(self.last_step().idata, st.idata):
+        steps = self._steered_behind()
+        if not steps:
             return None
         t, rows, row = point[0], point[1], point[2]
         values, at = np.empty(cells), row
@@ -415,6 +425,30 @@ class HeldRun(Run):
         if code & CHANGED:
             self._given, self._jumped = None, (steps, t, rows, row)
         return code, values
+
+    def steer_to(
+        self, point: tuple, first: int, count: int, value: float, end: float, cells: int, t: float, keep: bool
+    ) -> tuple[int, np.ndarray, tuple[Status, str] | None] | None:
+        """Steer, and go on to ``t``, in one compiled call; return what `steer` and what `go_to` returns, or None."""
+        steps, rows, row, at = self._steered_behind(), self.rows, self.row, point[2]
+        if not steps or point[1] is not rows:
+            return None
+        values = np.empty(cells)
+        code = self._steer_and_go_on(
+            self.functions, self._at, point[0], at, first, count, value, end, values, t, row, self._look_at
+        )
+        if code & (CHANGED << 2):
+            self._given, self._jumped = None, (steps, point[0], rows, at)
+        return code >> 2, values, self._arrive(code & 3, t, row, keep)
+
+    def _steered_behind(self) -> int:
+        """Return the steps behind which an input can be steered by compiled code, 0 where it cannot."""
+        st, given = self.state, self._given
+        steps = st.steps
+        if not steps or st.n_events:
+            return 0
+        told = self.last_records.changed_at == steps or (given is not None and given[0] == steps)
+        return 0 if told and not np.array_equal(self.last_step().idata, st.idata) else steps
 
     def _copied(self, rows: Rows, row: int) -> int:
         """Copy a point of earlier rows to where the next one is going to be written; return that row."""

@@ -118,6 +118,11 @@ def reach(bound, st, part, plan, factors, advance_address, t, row, last):
         NOT_BEGUN where the values have to be told from Python; REACHED;
         INTERRUPTED where ``st.code`` has to be heeded, a look is due, or an event has come.
     """
+    if t != st.asked:
+        # not the rest of the way to a point that was asked for before
+        if st.asked != -np.inf:
+            st.jumps_in_turn = 0
+        st.asked = t
     if t <= st.t:
         return REACHED if write_within(st, part, t, row) else NOT_BEGUN
     if t > st.t_end or st.code != RUNNING or st.steps >= last:
