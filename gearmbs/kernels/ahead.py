@@ -21,6 +21,7 @@ from threading import Condition, Thread
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.kernels import COMPILER, PLAIN
+from gearmbs.system import cores
 
 if TYPE_CHECKING:
     from gearmbs.kernels.jit import Kernel
@@ -240,8 +241,7 @@ def _check_folders(packages: set[str]) -> None:
 
 
 def _cores() -> int:
-    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(available, 8)
+    return min(cores(), 8)
 
 
 class _Tasks:

@@ -12,6 +12,7 @@ from typing import Any
 
 import xarray as xr
 
+from gearmbs.files import LONGEST_STEM
 from gearmbs.progress import staged
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.csv import CUT
@@ -20,6 +21,7 @@ from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
 from gearmbs.signals.signal.record import Progress, Record, checked_gaps, columns_asked, record_of, signal_from
 from gearmbs.signals.signal.signal import as_signal
 from gearmbs.signals.signal.units import check_units
+from gearmbs.system import rename_over, umask
 from gearmbs.wording import warn
 
 FORMATS = tuple(TABLE)
@@ -160,15 +162,13 @@ def write_record(record: Record, path: Path, format: str | None = None, progress
         raise SignalFileError(path, known.not_written[path.suffix.lower()])
     if not path.parent.is_dir():
         raise SignalFileError(path, f"there is no folder {path.parent}; make it first")
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem[:LONGEST_STEM]}.", suffix=".part", dir=path.parent)
     os.close(handle)
     part = Path(name)
     try:
         known.write(record, part, progress)
-        mask = os.umask(0)
-        os.umask(mask)
-        part.chmod(0o666 & ~mask)
-        part.replace(path)
+        part.chmod(0o666 & ~umask())
+        rename_over(part, path)
     except SignalFileError as exc:
         raise SignalFileError(path, exc.fault) from exc
     finally:

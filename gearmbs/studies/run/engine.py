@@ -21,7 +21,6 @@ import multiprocessing
 import os
 import pickle
 import queue
-import signal
 import sys
 import threading
 import time
@@ -33,7 +32,8 @@ from multiprocessing.connection import Connection, wait
 from types import ModuleType
 from typing import Any
 
-from gearmbs.studies.run.claims import STOPPED, Claimed, Ledger, owner, process_of, spent, vacant
+from gearmbs.studies.run.claims import STOPPED, Claimed, Ledger, owner, vacant
+from gearmbs.system import deaf, leave_interrupts_to_parent, process_of, spent
 from gearmbs.wording import warn
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -110,11 +110,6 @@ def outcome(work: Work, job: Any, report: Callable[[float], None]) -> tuple[str,
         return REFUSED, error
     except Exception as error:
         return FAILURE, error
-
-
-def available_cores() -> int:
-    """Return the number of cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
 def silent(_fraction: float) -> None:
@@ -257,8 +252,7 @@ class _Watch:
 
 def _serve(work: Work, connection: Connection) -> None:
     """Work on the jobs that come through a pipe until it is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    leave_interrupts_to_parent()
     sending = threading.Lock()
 
     def send(message: Any) -> None:
@@ -338,19 +332,6 @@ def one_thread() -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
-
-
-@contextmanager
-def deaf() -> Iterator[None]:
-    """Let processes that start now be deaf to Ctrl-C, also while they import."""
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 @contextmanager
