@@ -159,7 +159,7 @@ def used_part(points: np.ndarray, cells: np.ndarray) -> skfem.MeshHex:
     return _skfem().MeshHex(points[:, used], numbers.reshape(cells.shape).T)
 
 
-def nodes_where(model: FiniteElementModel, condition) -> list[int]:
+def nodes_where(model: FiniteElementModel, condition: Callable[..., np.ndarray]) -> list[int]:
     """Return the numbers of the nodes at which a condition on x, y and z (arrays, m) holds: the face of an interface.
 
     Raises

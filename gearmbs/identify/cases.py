@@ -105,8 +105,9 @@ class CaseProblem:
             raise IdentifyError("cases: give a Case, or cases by the names in the column case")
         if way not in WAYS:
             raise IdentifyError(f"way is {way!r}; choose one of {', '.join(WAYS)}")
-        precise = {"tolerance": TOLERANCE}
-        self.cases = {str(name): case.as_one_of_many().changed(solver=precise) for name, case in cases.items()}
+        self.cases = {
+            str(name): case.as_one_of_many().changed(solver={"tolerance": TOLERANCE}) for name, case in cases.items()
+        }
         self.way, self.workers = way, workers
         self.free = [_in_si(item, self.cases) for item in ((free,) if isinstance(free, str | Free) else free)]
         paths = [path for item in self.free for path in (item.name, *item.also)]
