@@ -13,6 +13,7 @@ from gearmbs import _command
 from gearmbs.adams.commands import adams, plant
 from gearmbs.campaigns.commands import app as campaign
 from gearmbs.identify.commands import identify
+from gearmbs.logs import listen
 from gearmbs.signals.commands import analyse, compare, trend, waterfall
 from gearmbs.signals.encoders.commands import transmission_error
 from gearmbs.studies.commands import bench, campbell, gearbox, paper, resonance, run, sweep
@@ -40,8 +41,13 @@ def _noted(number: int) -> None:
 @app.callback(invoke_without_command=True)
 def main(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    verbose: Annotated[
+        int, typer.Option("--verbose", "-v", count=True, help="Say what is done; given twice, also by whom and how.")
+    ] = 0,
 ) -> None:
     """Multibody gear dynamics."""
+    if verbose:
+        listen("info" if verbose == 1 else "debug")
     # many small products: threads of the linear algebra library double the time; numpy is not loaded yet
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")

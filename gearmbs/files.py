@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from gearmbs.logs import logger
 from gearmbs.system import rename_over
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def whole_file(path: str | Path, *, durable: Path | None = None) -> Iterator[Pat
         if durable is not None:
             to_disk(part)
         rename_over(part, path)
+        logger("files").debug("wrote %s", path)
         if durable is not None:
             # those that are there already may have been made by a process that was killed before it came to this
             for folder in path.parents[: len(path.relative_to(durable).parts)]:

@@ -30,8 +30,8 @@ from gearmbs.mechanism import Mechanism, Simulator, forward_sensitivities, stead
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.native import export
 from gearmbs.signals import (
-    analyse, analyse_file, bandpass, compare_files, envelope, envelope_spectrum, estimate_speed, kurtogram, order_map, order_track, read_pulses, require,
-    series, spectrogram, spectrum, trend, waterfall,
+    analyse, analyse_file, bandpass, compare_files, envelope, envelope_spectrum, estimate_speed, kurtogram, order_map,
+    order_track, read_pulses, require, series, spectrogram, spectrum, trend, waterfall,
 )
 from gearmbs.studies import Case, bearing_rig, case_mechanism, run_case, run_cases, simulate_case, steady
 from gearmbs.view import (

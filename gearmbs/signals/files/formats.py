@@ -13,6 +13,7 @@ from typing import Any
 import xarray as xr
 
 from gearmbs.files import LONGEST_STEM
+from gearmbs.logs import logger
 from gearmbs.progress import staged
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.csv import CUT
@@ -96,6 +97,8 @@ def read_signal(
         signal = signal_from(
             record, path, rate=hertz, units=units, speed=constant, teeth=teeth, channels=channels, gaps=gaps
         )
+    sizes = signal.sizes
+    logger("signals").debug("read %s as %s: %d channels of %d samples", path, format, sizes["channel"], sizes["time"])
     return with_speed(signal, speed) if is_curve(speed) else signal
 
 
@@ -169,6 +172,7 @@ def write_record(record: Record, path: Path, format: str | None = None, progress
         known.write(record, part, progress)
         part.chmod(0o666 & ~umask())
         rename_over(part, path)
+        logger("files").debug("wrote %s", path)
     except SignalFileError as exc:
         raise SignalFileError(path, exc.fault) from exc
     finally:

@@ -32,6 +32,7 @@ from multiprocessing.connection import Connection, wait
 from types import ModuleType
 from typing import Any
 
+from gearmbs.logs import logger
 from gearmbs.studies.run.claims import STOPPED, Claimed, Ledger, owner, vacant
 from gearmbs.system import deaf, leave_interrupts_to_parent, process_of, spent
 from gearmbs.wording import warn
@@ -45,6 +46,10 @@ REPORT_SECONDS = 0.2
 
 PROGRESS, RESULT, CLAIMED, FAILURE, DEATH, REFUSED = "progress", "result", "claimed", "failure", "death", "refused"
 ALIVE = "alive"
+ENDS = {RESULT: "done", CLAIMED: "claimed elsewhere", FAILURE: "failed", DEATH: "process ended", REFUSED: "refused"}
+"""What is logged of the end of a job."""
+
+LOG = logger("studies")
 END = object()
 
 Work = Callable[[Any, Callable[[float], None]], Any]
@@ -190,6 +195,7 @@ def processes(work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool =
                         process.start()
                     theirs.close()
                     started[ours] = process
+                    LOG.debug("worker process %s started", process.pid)
                     idle.append(ours)
                 connection = idle.pop()
                 at_work[connection] = taken  # type: ignore[assignment]
@@ -384,6 +390,7 @@ class _Run:
         self.jobs, self.done, self.tries = jobs, done, tries
         self.queue, self.elsewhere = deque(range(len(jobs))), deque[int]()
         self.results: dict[int, Any] = {}
+        self.begun: dict[int, float] = {}
         self.deaths: Counter[int] = Counter()
         self.refusals: Counter[int] = Counter()
 
@@ -391,6 +398,7 @@ class _Run:
         """Yield the jobs that wait, while there is time, and note their numbers in ``taken``."""
         while self.queue and time.monotonic() < end:
             taken.append(self.queue.popleft())
+            self.begun[taken[-1]] = time.monotonic()
             yield self.jobs[taken[-1]]
 
     def finish(self, k: int, value: Any) -> None:
@@ -401,6 +409,11 @@ class _Run:
 
     def note(self, k: int, kind: str, value: Any) -> None:
         """Take what a worker says of a job: its result, or why there is none; raise what ends the run."""
+        name = getattr(self.jobs[k], "name", self.jobs[k])
+        seconds = time.monotonic() - self.begun.pop(k, time.monotonic())
+        LOG.info(
+            "%s: %s after %.1f s%s", name, ENDS[kind], seconds, f" ({value})" if kind in (FAILURE, REFUSED) else ""
+        )
         if kind == FAILURE:
             raise value
         if kind == CLAIMED:
