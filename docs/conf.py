@@ -105,4 +105,8 @@ def setup(app) -> None:
     app.connect("autodoc-process-docstring", api_pages.escape_bars, priority=100)
     app.connect("build-finished", offline.carry_mathjax)
     app.connect("build-finished", offline.lighten_sources)
+    app.connect("build-finished", offline.lighten_figures)
+    app.connect("build-finished", offline.lighten_pages)
+    app.connect("build-finished", offline.without_full_index)
     app.connect("build-finished", offline.refuse_servers)
+    app.connect("build-finished", offline.hold_size)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import signal
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ import typer
 
 from gearmbs.progress import alone
 from gearmbs.schema.described import read_toml
+from gearmbs.system import ASKED_TO_END
 
 UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 """What is wrong with the place and not with the file."""
@@ -25,7 +25,7 @@ def fail(message: str) -> None:
     raise typer.Exit(1)
 
 
-ended_by = signal.SIGINT
+ended_by = ASKED_TO_END
 """The signal that asked the program to end, as the handler of `gearmbs.cli` notes it."""
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
-import signal
 import sys
-from types import FrameType
 from typing import Annotated
 
 import typer
@@ -15,10 +13,12 @@ from gearmbs import _command
 from gearmbs.adams.commands import adams, plant
 from gearmbs.campaigns.commands import app as campaign
 from gearmbs.identify.commands import identify
+from gearmbs.logs import listen
 from gearmbs.signals.commands import analyse, compare, trend, waterfall
 from gearmbs.signals.encoders.commands import transmission_error
 from gearmbs.studies.commands import bench, campbell, gearbox, paper, resonance, run, sweep
 from gearmbs.studies.export import export
+from gearmbs.system import end_like_interrupt, forgive_output
 
 app = typer.Typer(
     name="gearmbs",
@@ -34,23 +34,25 @@ for command in (paper, run, sweep, bench, gearbox, resonance, campbell, *of_reco
 app.add_typer(campaign)
 
 
-def _interrupt(number: int, _: FrameType | None) -> None:
-    """Take a request to end like Ctrl-C, also where Ctrl-C is ignored, as in a background job."""
-    _command.ended_by = signal.Signals(number)
-    if signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None):
-        raise KeyboardInterrupt
-    signal.raise_signal(signal.SIGINT)
+def _noted(number: int) -> None:
+    _command.ended_by = number
 
 
 @app.callback(invoke_without_command=True)
 def main(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    verbose: Annotated[
+        int, typer.Option("--verbose", "-v", count=True, help="Say what is done; given twice, also by whom and how.")
+    ] = 0,
 ) -> None:
     """Multibody gear dynamics."""
+    if verbose:
+        listen("info" if verbose == 1 else "debug")
     # many small products: threads of the linear algebra library double the time; numpy is not loaded yet
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    signal.signal(signal.SIGTERM, _interrupt)
+    end_like_interrupt(_noted)
+    forgive_output()
     # a command makes many objects and drops few: looking for cycles at every 700 of them costs a tenth of its start
     gc.set_threshold(50_000, 20, 20)
     if version:

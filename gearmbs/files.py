@@ -13,8 +13,15 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from gearmbs.logs import logger
+from gearmbs.system import rename_over
+
 if TYPE_CHECKING:
     import pyarrow as pa
+
+
+LONGEST_STEM = 40
+"""Characters of a name that its temporary one shows."""
 
 
 @contextmanager
@@ -36,12 +43,14 @@ def whole_file(path: str | Path, *, durable: Path | None = None) -> Iterator[Pat
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
+    # no longer than the name itself may be: names have 255 bytes at most
+    part = path.with_name(f".{path.stem[:LONGEST_STEM]}.{uuid.uuid4().hex[:8]}{path.suffix}")
     try:
         yield part
         if durable is not None:
             to_disk(part)
-        os.replace(part, path)
+        rename_over(part, path)
+        logger("files").debug("wrote %s", path)
         if durable is not None:
             # those that are there already may have been made by a process that was killed before it came to this
             for folder in path.parents[: len(path.relative_to(durable).parts)]:

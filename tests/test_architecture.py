@@ -18,12 +18,12 @@ ROOT = Path(gearmbs.__file__).parent
 PAGE = Path(__file__).parent.parent / "docs" / "architecture.md"
 
 SUPPORT = {
-    "_command", "_lazy", "_display", "compile", "files", "progress", "saving", "schema", "units",
+    "_command", "_lazy", "_display", "compile", "files", "logs", "progress", "saving", "schema", "system", "units",
     "wording",
 }  # fmt: skip
 """Modules of the top that any package may use: lazy imports, how objects show themselves and are saved, files that
-appear when they are whole, progress, units, how descriptions are read and checked, parts of messages, and the command
-that compiles ahead."""
+appear when they are whole, progress, logs, units, what systems do differently, how descriptions are read and checked,
+parts of messages, and the command that compiles ahead."""
 
 MAY_KNOW = {
     "kernels": {"dae"},

@@ -51,8 +51,9 @@ from gearmbs.signals.rotation.order_tracking import OrderMapKeywords, OrderTrack
 from gearmbs.signals.signal.arguments import GIVEN, DataKeywords
 from gearmbs.signals.time_frequency import SpectrogramKeywords, SweepWaterfallKeywords, WaterfallKeywords
 from gearmbs.studies import Case
+from gearmbs.studies.case import keywords
 from gearmbs.studies.case.case import CaseKeywords
-from gearmbs.studies.case.section import sections_of
+from gearmbs.studies.case.section import measures_of, sections_of
 from gearmbs.studies.run.rig import RigKeywords, gear_rig
 from gearmbs.view import scenes, waterfall_plot
 from gearmbs.view.scene import Scene, StillKeywords
@@ -177,10 +178,23 @@ def test_functions_of_pulses_in_data_take_the_keywords_of_both():
     assert told(OfChannelKeywords) == told(TrainKeywords) | told(DataKeywords)
 
 
-def test_fields_of_a_case_are_sections_or_some_of_their_fields():
-    kinds = {name: f"{kind.__name__} | dict[str, Any]" for name, kind in sections_of(Case).items()}
-    assert told(CaseKeywords) == {"name": "str"} | kinds
+def test_fields_of_a_case_are_sections_or_tables_of_their_fields():
+    kinds = sections_of(Case)
+    tables = {name: kind.__name__.removesuffix("Settings") + "Keywords" for name, kind in kinds.items()}
+    assert told(CaseKeywords) == {"name": "str"} | {
+        name: f"{kind.__name__} | {tables[name]}" for name, kind in kinds.items()
+    }
     assert set(told(CaseKeywords)) == set(Case.model_fields)
+    for name, kind in kinds.items():
+        fields = told(getattr(keywords, tables[name]))
+        assert list(fields) == list(kind.model_fields), name
+        for key, measure in measures_of(kind).items():
+            # a share, which nobody writes with a unit, or a quantity
+            one = "float" if measure.dimension == "dimensionless" else "QuantityLike"
+            both = f"{one} | Sequence[{one}]" if one == "float" else "Each"
+            wide = "Curve" if measure.curve else both if measure.each else one
+            optional = kind.model_fields[key].default is None
+            assert fields[key] == wide + " | None" * optional, f"{name}.{key}"
 
 
 def test_settings_of_plans_are_fields_as_they_are_given():

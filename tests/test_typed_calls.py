@@ -30,10 +30,10 @@ from gearmbs.mechanism import Mechanism, Simulator, forward_sensitivities, stead
 from gearmbs.mechanism.parts.joints import Joint
 from gearmbs.native import export
 from gearmbs.signals import (
-    analyse, analyse_file, compare_files, envelope_spectrum, kurtogram, order_map, order_track, read_pulses, require,
-    series, spectrogram, spectrum, trend, waterfall,
+    analyse, analyse_file, bandpass, compare_files, envelope, envelope_spectrum, estimate_speed, kurtogram, order_map,
+    order_track, read_pulses, require, series, spectrogram, spectrum, trend, waterfall,
 )
-from gearmbs.studies import Case, bearing_rig, case_mechanism, run_case, simulate_case, steady
+from gearmbs.studies import Case, bearing_rig, case_mechanism, run_case, run_cases, simulate_case, steady
 from gearmbs.view import (
     Scene, order_map_plot, order_track_plot, planetary_scene, report_plot, spectrogram_plot, waterfall_plot,
 )
@@ -88,6 +88,14 @@ simulate_case(case, max_step=1e-4, dense_output=True)
 case_mechanism(case, "6206/CN", cage_slip=0.01, damping="10 us")
 bearing_rig(bearing, speed="1800 rpm", defects=(), slip_scatter=0.01)
 case.changed(name="faster", operation={"speed": "1500 rpm"})
+Case(name="own", gears={"teeth": (21, 34), "module": "2.5 mm"}, fault={"teeth": "broken tooth", "backlash": 1e-4})
+Case(operation={"speed": [("0 s", "0 rpm"), ("2 s", "3000 rpm")], "duration": "auto"}, solver={"lump": True})
+levels: list[xr.Dataset] = run_cases([case], workers=2)
+failures = [one for one in run_cases([case], errors="keep") if not isinstance(one, xr.Dataset)]
+bandpass(signal, "500 Hz", 2e3, transition="50 Hz", channels=["a"])
+envelope(signal, ("1 kHz", "3 kHz"), transition="100 Hz")
+envelope_spectrum(signal, ("1 kHz", "3 kHz"), segment="0.5 s")
+estimate_speed(signal, 24, speed_range=("600 rpm", "3000 rpm"))
 record: xr.Dataset = steady(case, most=100).record
 steady(m, "2 ms", settle=3)
 steady(train, attracting=False)
@@ -155,6 +163,12 @@ case_mechanism(case, "6206/CN", cageslip=0.01)
 bearing_rig(bearing, speed="1800 rpm", slip_seed="first")
 case.changed(operations={"speed": "1500 rpm"})
 case.changed(name=3)
+Case(operation={"sped": "1500 rpm"})
+Case(name="own", gear={"teeth": (21, 34)})
+Case(gears={"teeth": (21, 34), "module": ["2.5", "mm"]})
+case.changed(solver={"tolerance": "1e-7"})
+bandpass(signal, "500 Hz", None, transition="50 Hz")
+one_record: xr.Dataset = run_cases([case], errors="keep")[0]
 steady(case, "2 ms")
 steady(m)
 steady(train, settel=3)

@@ -5,6 +5,7 @@ The models are those of the test suite, which asserts the same numbers with its 
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from collections.abc import Callable, Iterator
@@ -32,8 +33,14 @@ Row = tuple[str, float, float]
 
 def table(name: str) -> pd.DataFrame:
     """Return the rows of a source with the difference in parts of their number."""
-    rows = [(what, f"{theirs:.6g}", f"{ours:.6g}", _apart(theirs, ours)) for what, theirs, ours in SOURCES[name].rows()]
+    rows = [(what, f"{theirs:.6g}", f"{ours:.6g}", _apart(theirs, ours)) for what, theirs, ours in _rows(name)]
     return pd.DataFrame(rows, columns=["quantity", "theirs", "ours", "difference"]).set_index("quantity")
+
+
+@functools.cache
+def _rows(name: str) -> list[Row]:
+    """Return the rows of a source; the page asks for them twice."""
+    return list(SOURCES[name].rows())
 
 
 def _apart(theirs: float, ours: float) -> str:
@@ -201,10 +208,10 @@ SOURCES: dict[str, Source] = {
 def overview() -> pd.DataFrame:
     """Return a row a source with how many numbers are compared and the largest and the middle difference."""
     rows = []
-    for source in SOURCES.values():
+    for name, source in SOURCES.items():
         if source.rows is _recordings:
             continue
-        apart = [abs((ours - theirs) / (theirs or 1.0)) for _, theirs, ours in source.rows()]
+        apart = [abs((ours - theirs) / (theirs or 1.0)) for _, theirs, ours in _rows(name)]
         spread = (len(apart), f"{np.median(apart):.1e}", f"{max(apart):.1e}")
         rows.append((source.who, source.what, source.year, *spread, source.where))
     columns = ["source", "what", "year", "numbers", "middle difference", "largest", "where"]

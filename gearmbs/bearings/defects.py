@@ -48,7 +48,7 @@ class Defect(Described):
         return float(getattr(self, next(name for name, one in measures_of(type(self)).items() if not one.whole)))
 
     @property
-    def description(self) -> dict[str, Any]:
+    def description(self) -> dict[str, object]:
         """Label, severity and all parameters, for storing beside results."""
         return {"label": self.label, "severity": self.severity, **asdict(self)}
 

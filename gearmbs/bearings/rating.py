@@ -214,7 +214,9 @@ def life_exponent(bearing: Bearing) -> float:
     return 10.0 / 3.0 if bearing.rollers else 3.0
 
 
-def mean_load(bearing: Bearing, radial: np.ndarray, axial: np.ndarray | None = None, speed: np.ndarray | None = None):
+def mean_load(
+    bearing: Bearing, radial: np.ndarray, axial: np.ndarray | None = None, speed: np.ndarray | None = None
+) -> float:
     """Return the constant load with the same life as loads over time, N.
 
     Parameters

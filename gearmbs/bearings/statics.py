@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,9 @@ from gearmbs.bearings.kinds import KINDS, BearingError, require
 from gearmbs.bearings.settings import BearingKeywords, BearingTables, bearing_settings, pack
 from gearmbs.units import QuantityLike, to_si
 from gearmbs.wording import warn
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 AXES = ("x", "y", "z", "tilt x", "tilt y")
 
@@ -65,7 +68,7 @@ class BearingState:
         """Force of the most loaded element, N."""
         return float(self.element_loads.max())
 
-    def to_dataset(self):
+    def to_dataset(self) -> xr.Dataset:
         """Return all of it as a labelled `xarray.Dataset`."""
         import xarray as xr
 
@@ -173,7 +176,9 @@ class BearingStatics:
             found.append(self.under(load, cage_angle=cage_angle, start=start))
         return found
 
-    def deflection_curve(self, direction: npt.ArrayLike, loads: npt.ArrayLike, *, cage_angle: float | None = None):
+    def deflection_curve(
+        self, direction: npt.ArrayLike, loads: npt.ArrayLike, *, cage_angle: float | None = None
+    ) -> xr.Dataset:
         """Return displacement and stiffness along a direction over the size of a load.
 
         Parameters

@@ -21,13 +21,15 @@ from gearmbs.campaigns.stored.checks import check_folder, litter
 from gearmbs.progress import alone, bars, watched
 from gearmbs.schema.described import chosen
 from gearmbs.studies.run.claims import owner, told
+from gearmbs.system import cores
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from gearmbs.campaigns.sensitivity import SobolIndices
     from gearmbs.campaigns.stored.exports import ExportKeywords
-    from gearmbs.campaigns.surrogates import ResponseSurface
+    from gearmbs.campaigns.surrogates import PolynomialChaos, ResponseSurface
     from gearmbs.view.figures.style import Picture
 
 OTHER_CODE = ("refuse", "mix", "again")
@@ -126,7 +128,7 @@ class Campaign:
             work, with the reason; or with ``on_failure="stop"`` at the first failed case.
         """
         from gearmbs.campaigns.cluster import DaskRunner
-        from gearmbs.studies.run.engine import available_cores, here, processes
+        from gearmbs.studies.run.engine import here, processes
 
         where: Any
         if workers is not None:
@@ -138,7 +140,7 @@ class Campaign:
         else:
             # workers need modules only, which they import by name
             where = here if workers == 0 else partial(processes, own_main=False)
-        return self._drive(where, workers or available_cores(), None, progress, minutes, other_code, page)
+        return self._drive(where, workers or cores(), None, progress, minutes, other_code, page)
 
     def work(
         self, part: int, parts: int, *, minutes: float | None = None, other_code: str = "refuse"
@@ -319,7 +321,7 @@ class Campaign:
         return open_dataset(self.folder)
 
     # of which kind the answer is follows from the design, which a type does not say
-    def sensitivity(self, result: str) -> Any:
+    def sensitivity(self, result: str) -> SobolIndices | PolynomialChaos | pd.DataFrame:
         """Return what decides a result, by the design; see `gearmbs.campaigns.sensitivity.sensitivity`."""
         from gearmbs.campaigns.sensitivity import sensitivity
 

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.studies.run.engine import (
@@ -30,6 +30,9 @@ from gearmbs.studies.run.engine import (
     outcome,
     silent,
 )
+
+if TYPE_CHECKING:
+    import distributed
 
 # Job scripts for Slurm and PBS.
 
@@ -251,7 +254,7 @@ def batch_cluster(system: str, *, walltime: str = "01:00:00", memory: str = "2GB
 
 # what a batch system takes beside is known to dask-jobqueue alone
 @contextmanager
-def dask_client(address: str, workers: int | None = None, **settings: Any) -> Iterator[Any]:
+def dask_client(address: str, workers: int | None = None, **settings: Any) -> Iterator[distributed.Client]:
     """Yield a client of a scheduler.
 
     Parameters

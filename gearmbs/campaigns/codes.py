@@ -18,6 +18,7 @@ from gearmbs.campaigns.settings import CampaignError
 from gearmbs.files import write_whole
 from gearmbs.studies.run.code import Code, CodeChanged, is_installed, what_counts
 from gearmbs.studies.run.loaded import as_loaded
+from gearmbs.system import rename_over
 
 FIRST = "first"
 
@@ -141,14 +142,14 @@ def has_grown(folder: Folder, code: Code, former: Code | None) -> bool:
 def _write_first(place: Path, note: str) -> None:
     """Write a note unless another process has written one: whoever comes second finds the first one's."""
     part = place.with_name(f".{os.getpid()}.{place.name}")
-    part.write_text(note)
+    part.write_text(note, encoding="utf-8")
     try:
         os.link(part, place)
     except FileExistsError:
         pass
     except OSError:
         # no links on this file system
-        os.replace(part, place)
+        rename_over(part, place)
     finally:
         part.unlink(missing_ok=True)
 

@@ -233,15 +233,17 @@ def report(
 def sensitivity(folder: Place, result: Annotated[str, typer.Argument(help="Column of the table.")]) -> None:
     """Print what decides a result: Sobol' indices, elementary or main effects, by the design."""
     with guarded():
-        from gearmbs.campaigns import Campaign
+        from gearmbs.campaigns import Campaign, PolynomialChaos, SobolIndices
 
         found = Campaign(folder).sensitivity(result)
-        typer.echo((found.table() if hasattr(found, "table") else found).to_string(float_format="%.4g"))
-        if getattr(found, "explained", 0.0) > 0.0:
+        # a table of effects is one already
+        table: Any = found.table() if isinstance(found, (SobolIndices, PolynomialChaos)) else found
+        typer.echo(table.to_string(float_format="%.4g"))
+        if isinstance(found, SobolIndices) and found.explained > 0.0:
             typer.echo(
                 f"polynomials as control variates explain {found.explained:.1%} of the variance of points left out"
             )
-        if hasattr(found, "q_squared"):
+        if isinstance(found, PolynomialChaos):
             typer.echo(f"from a polynomial that explains {found.q_squared:.1%} of the variance of points left out")
 
 

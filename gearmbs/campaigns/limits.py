@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import faulthandler
-import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
+
+from gearmbs.system import address_space, bounded_memory, ringing, rings
 
 _ALONE = threading.Lock()
 """Held while a bound of memory is in force, which is the whole process's."""
@@ -73,8 +73,8 @@ def _timer(seconds: float | None) -> Iterator[None]:
         yield
         return
     message = f"more than {seconds:g} s of processor time"
-    if threading.current_thread() is threading.main_thread() and hasattr(signal, "SIGPROF"):
-        with _alarm(signal.SIGPROF, signal.ITIMER_PROF, later(seconds), message):
+    if rings("processor"):
+        with ringing("processor", later(seconds), lambda: _late(message)):
             yield
     elif hasattr(time, "pthread_getcpuclockid"):
         with _watched(later(seconds), message):
@@ -85,32 +85,22 @@ def _timer(seconds: float | None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _clock(seconds: float | None, mortal: bool) -> Iterator[None]:
-    if seconds is None or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGALRM"):
+    if seconds is None or not rings("wall"):
         yield
         return
     if mortal:
         faulthandler.dump_traceback_later(last(seconds), exit=True)
     try:
         message = f"more than {seconds:g} s by the clock"
-        with _alarm(signal.SIGALRM, signal.ITIMER_REAL, later(seconds), message):
+        with ringing("wall", later(seconds), lambda: _late(message)):
             yield
     finally:
         if mortal:
             faulthandler.cancel_dump_traceback_later()
 
 
-@contextlib.contextmanager
-def _alarm(number: int, timer: int, allowed: float, message: str) -> Iterator[None]:
-    def late(*_args) -> None:
-        raise TimeLimitReached(message)
-
-    before = signal.signal(number, late)
-    signal.setitimer(timer, allowed)
-    try:
-        yield
-    finally:
-        signal.setitimer(timer, 0.0)
-        signal.signal(number, before)
+def _late(message: str) -> None:
+    raise TimeLimitReached(message)
 
 
 @contextlib.contextmanager
@@ -148,27 +138,8 @@ def _watched(allowed: float, message: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _memory(limit: float | None) -> Iterator[None]:
-    if limit is None or _address_space() is None:
+    if limit is None or address_space() is None:
         yield
         return
-    import resource
-
-    with _ALONE:
-        soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-        bound = int((_address_space() or 0) + limit)
-        if hard != resource.RLIM_INFINITY:
-            bound = min(bound, hard)
-        resource.setrlimit(resource.RLIMIT_AS, (bound, hard))
-        try:
-            yield
-        finally:
-            resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
-
-def _address_space() -> int | None:
-    try:
-        import resource
-
-        return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    except (OSError, ImportError):
-        return None
+    with _ALONE, bounded_memory(limit):
+        yield

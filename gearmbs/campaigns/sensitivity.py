@@ -14,7 +14,7 @@ import itertools
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -429,7 +429,7 @@ def _levels(plan: Plan) -> list[int]:
     return levels
 
 
-def sensitivity(campaign: Campaign, result: str) -> Any:
+def sensitivity(campaign: Campaign, result: str) -> SobolIndices | PolynomialChaos | pd.DataFrame:
     """Return what decides a result, by the campaign's design.
 
     `SobolIndices` of a Saltelli design or a full grid, a table of effects of a Morris or factorial one, and a

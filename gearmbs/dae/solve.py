@@ -14,6 +14,7 @@ from gearmbs.dae.methods import those_that
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, DenseOutput, Status
 from gearmbs.dae.user_problem import EquationKeywords, as_problem
+from gearmbs.logs import log_run
 from gearmbs.progress import time_bar
 from gearmbs.wording import any_of
 
@@ -135,9 +136,12 @@ def solve_dae(
             raise ValueError(f"method={chosen.method!r} has neither dense output nor events here; use {others}")
     with time_bar(chosen.progress, "solving", t0, t_end) as told:
         chosen = replace(chosen, progress=told)
-        if not chosen.integrator.compiled:
-            return _run_at_outputs(problem, chosen, (t0, t_end), t_eval)
-        return chosen.integrator.load()(problem, t_eval, chosen, t_end=t_end)
+        if chosen.integrator.compiled:
+            result = chosen.integrator.load()(problem, t_eval, chosen, t_end=t_end)
+        else:
+            result = _run_at_outputs(problem, chosen, (t0, t_end), t_eval)
+        log_run("dae", f"{problem.n} equations by {chosen.method}", result)
+        return result
 
 
 def _checked_problem(

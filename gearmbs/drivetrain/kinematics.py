@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.loads import RPM, Drag, Load, TableLoad
@@ -29,6 +29,14 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
 
 HZ = 2.0 * math.pi
+
+
+class BearingsAndShafts(TypedDict):
+    """What `gearmbs.signals.diagnose_bearing` takes: bearings with ratios, rad/s of the reference, other ratios."""
+
+    bearing: dict[str, tuple[Any, float]]
+    speed: float
+    shafts: list[float]
 
 
 class KinematicTable:
@@ -250,7 +258,7 @@ class KinematicTable:
         one = self._meshing(mesh if isinstance(mesh, str) else mesh.name)
         return {"speed": abs(self.train.against_carrier(one)), "teeth": tuple(gear.teeth for gear in one.gears)}
 
-    def for_bearings(self, shaft: str | None = None) -> dict[str, Any]:
+    def for_bearings(self, shaft: str | None = None) -> BearingsAndShafts:
         """Return ``bearing``, ``speed`` (rad/s) and ``shafts`` as `gearmbs.signals.diagnose_bearing` takes them.
 
         Parameters

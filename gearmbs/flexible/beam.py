@@ -11,8 +11,12 @@ of the floating frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from gearmbs.flexible.material import ElasticMaterial
 
 DOFS = 6
 """Degrees of freedom of a node."""
@@ -62,7 +66,9 @@ class BeamSection:
     inertia: tuple[float, float, float]
 
     @classmethod
-    def ring(cls, material, outer: float, inner: float = 0.0, shear: float | None = None) -> BeamSection:
+    def ring(
+        cls, material: ElasticMaterial, outer: float, inner: float = 0.0, shear: float | None = None
+    ) -> BeamSection:
         """Return the section of a round bar or tube; ``shear`` replaces Cowper's coefficient."""
         area = np.pi / 4 * (outer**2 - inner**2)
         second = np.pi / 64 * (outer**4 - inner**4)
@@ -74,7 +80,9 @@ class BeamSection:
         )  # fmt: skip
 
     @classmethod
-    def rectangle(cls, material, width: float, height: float, shear: float | None = None) -> BeamSection:
+    def rectangle(
+        cls, material: ElasticMaterial, width: float, height: float, shear: float | None = None
+    ) -> BeamSection:
         """Return the section of a bar, ``width`` along x and ``height`` along y, m.
 
         The torsion constant is Saint-Venant's series; ``shear`` replaces Cowper's coefficient

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
-from gearmbs.flexible.interfaces import Resolved, resolve
+from gearmbs.flexible.interfaces import Interface, Resolved, resolve
 from gearmbs.flexible.modal_model import ModalModel
 from gearmbs.flexible.reduction import GROUNDED, free_modes, static_flexibility
 
@@ -188,7 +189,9 @@ class ReductionReport:
         return "\n".join([head, *rows, *lost, f"errors below 1 % up to {self.converged_up_to():.6g} Hz"])
 
 
-def check_reduction(model: FiniteElementModel, reduced: ModalModel, interfaces=None) -> ReductionReport:
+def check_reduction(
+    model: FiniteElementModel, reduced: ModalModel, interfaces: Iterable[str | Interface] | None = None
+) -> ReductionReport:
     """Compare a reduction with its finite elements: free frequencies, shapes, static flexibility of the seats.
 
     Slow modes have little of the flexibility under torques; a body clamped at a seat is too stiff by what is lost.

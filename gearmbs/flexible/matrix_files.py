@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +12,7 @@ import scipy.sparse as sp
 
 from gearmbs.flexible.fe_model import FiniteElementModel
 from gearmbs.flexible.material import FlexibleError
+from gearmbs.system import survives
 from gearmbs.units import Quantity, to_si
 
 # Matrices and nodes in text files: tables of numbers, read whole or not at all.
@@ -505,16 +505,9 @@ def _opened(reader: Any, path: Path, needed: tuple[str, ...], what: str) -> Any:
 
 def _guarded(path: Path, wrong: str, load: Callable[[], Any]) -> Any:
     """Return what is read, first in a process of its own where there is one: the reader ends it on broken indices."""
-    if hasattr(os, "fork"):
-        child = os.fork()
-        if child == 0:
-            try:
-                load()
-            finally:
-                # what is wrong is told by the parent
-                os._exit(0)
-        if os.WIFSIGNALED(os.waitpid(child, 0)[1]):
-            raise FlexibleError(f"{path.name}: {wrong}: its indices lead out of it; write it anew")
+    # what else is wrong is told by this process
+    if not survives(load):
+        raise FlexibleError(f"{path.name}: {wrong}: its indices lead out of it; write it anew")
     try:
         return load()
     except Exception as error:

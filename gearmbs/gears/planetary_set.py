@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -37,6 +37,14 @@ CLEARANCE = 0.25
 """Bottom clearance of the basic rack of ISO 53 over the module: a pin that is further off drives tips into roots."""
 NEARBY = 8
 """Teeth by which sun and planet of a set that is recommended may differ."""
+
+
+class StartAngles(TypedDict):
+    """Angles (rad) at which a set starts: of the ring, of each planet, and of its second wheel against its first."""
+
+    ring: float
+    planets: np.ndarray
+    steps: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -483,7 +491,7 @@ class PlanetarySet(Written):
 
     # --- places ---------------------------------------------------------------------------------------
 
-    def start_angles(self, sun: float = 0.0) -> dict[str, Any]:
+    def start_angles(self, sun: float = 0.0) -> StartAngles:
         """Angles at which all drive flanks just touch, for an angle of the sun and the carrier at 0.
 
         Returns

@@ -119,8 +119,9 @@ class CaseProblem(LevelProblem):
         for name, value, choices in (("way", way, WAYS), ("derivatives_by", derivatives_by, DERIVATIVES)):
             if value not in choices:
                 raise IdentifyError(f"{name} is {value!r}; choose one of {', '.join(choices)}")
-        precise = {"tolerance": TOLERANCE}
-        self.cases = {str(name): case.as_one_of_many().changed(solver=precise) for name, case in cases.items()}
+        self.cases = {
+            str(name): case.as_one_of_many().changed(solver={"tolerance": TOLERANCE}) for name, case in cases.items()
+        }
         self.way, self.workers = way, workers
         self.free = [in_si(item, self.cases) for item in ((free,) if isinstance(free, str | Free) else free)]
         paths = [path for item in self.free for path in (item.name, *item.also)]

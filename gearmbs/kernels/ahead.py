@@ -21,6 +21,8 @@ from threading import Condition, Thread
 from typing import TYPE_CHECKING, Any
 
 from gearmbs.kernels import COMPILER, PLAIN
+from gearmbs.logs import logger, tell
+from gearmbs.system import cores
 
 if TYPE_CHECKING:
     from gearmbs.kernels.jit import Kernel
@@ -115,14 +117,14 @@ _failures: list[str] = []
 def _say_once(line: str) -> None:
     if line not in _said:
         _said.add(line)
-        print(f"gearmbs: {line}", file=sys.stderr, flush=True)
+        tell("kernels", line)
 
 
 def compile_missing(kernel: Kernel) -> bool:
-    """Compile what a program lacks that has imported a kernel and found it missing; tell so on standard error.
+    """Compile what a program lacks that has imported a kernel and found it missing, and say so (`gearmbs.logs.tell`).
 
-    The announcement is printed once per process, and how far it is when it takes longer. Where helper processes fail,
-    this is told once, and they are not started again.
+    The announcement is made once per process, and how far it is when it takes longer. Where helper processes fail, this
+    is told once, and they are not started again.
 
     Returns
     -------
@@ -143,10 +145,11 @@ def compile_missing(kernel: Kernel) -> bool:
 
     def report(line: str) -> None:
         nonlocal told
+        logger("kernels").debug(line)
         now = time.perf_counter() - start
         if now - told > SILENT:
             told = now
-            print(f"gearmbs: {line.partition(' ')[0]} kernels after {now:.0f} s", file=sys.stderr, flush=True)
+            tell("kernels", f"{line.partition(' ')[0]} kernels after {now:.0f} s")
 
     if lacking := cache.lacking():
         _say_once(
@@ -162,7 +165,7 @@ def compile_missing(kernel: Kernel) -> bool:
         _say_once(f"helper processes failed ({reason}); kernels are compiled one by one, when they are called")
         return False
     if told:
-        print(f"gearmbs: compiled in {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
+        tell("kernels", f"compiled in {time.perf_counter() - start:.0f} s")
     return True
 
 
@@ -240,8 +243,7 @@ def _check_folders(packages: set[str]) -> None:
 
 
 def _cores() -> int:
-    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(available, 8)
+    return min(cores(), 8)
 
 
 class _Tasks:

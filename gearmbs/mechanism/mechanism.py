@@ -265,7 +265,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         function: QuantityLike | TimeFunction,
         *,
         axis: Vector = (0, 0, 1),
-        reaction=None,
+        reaction: Body | None = None,
     ) -> Torque:
         """Apply a torque f(t) in N m about an axis fixed in the reacting body (default: ground).
 
@@ -288,7 +288,9 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         other = against.marker_at(marker.global_position(), frame, name=f"{name}.J")
         return self.add(Torque(name, marker, other, other, as_function(function, "torque", f"torque '{name}'")))
 
-    def gear_contact(self, name: str, wheel_1: Body | Marker, wheel_2: Body | Marker, pair: ContactPair):
+    def gear_contact(
+        self, name: str, wheel_1: Body | Marker, wheel_2: Body | Marker, pair: ContactPair
+    ) -> ForceElement:
         """Let the teeth of two wheels touch.
 
         Parameters

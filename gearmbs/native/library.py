@@ -260,7 +260,7 @@ def _compile(
         '__asm__(".section .rodata\\n.balign 64\\n.global gearmbs_block\\n.hidden gearmbs_block\\n"',
         '        "gearmbs_block:\\n.incbin \\"block.bin\\"\\n.previous\\n");',
     ]
-    (room / "described.c").write_text("\n".join([*head, texts]))
+    (room / "described.c").write_text("\n".join([*head, texts]), encoding="utf-8")
     sources = ["gearmbs.c", "runtime.c", *others]
     for file in (*sources, *HEADERS):
         (room / file).write_bytes(_source(file))

@@ -27,7 +27,7 @@ def bearings_asked(texts: list[str], shafts: list[str] | None, train: Path | Non
     if train is not None:
         from gearmbs.drivetrain.description import read_description
 
-        asked = read_description(train).train.kinematics.for_bearings()
+        asked |= read_description(train).train.kinematics.for_bearings()
     asked["bearing"] = {**asked["bearing"], **bearing_list(texts)}
     if shafts is not None:
         asked["shafts"] = [*(asked["shafts"] or ()), *shaft_ratios(shafts)]

@@ -23,6 +23,7 @@ import xarray as xr
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import rate_of
+from gearmbs.signals.signal.units import Given
 
 OVERSAMPLED = 2.0
 """Blocks follow each other so densely that cyclic frequencies up to the highest and a line beyond are no aliases."""
@@ -31,7 +32,7 @@ FEWEST_BLOCKS = 16
 
 @takes_data(highest="frequency")
 def spectral_correlation(
-    signal: Any, highest: float, *, segment: int = 256, channel: str | None = None, **_data: Unpack[DataKeywords]
+    signal: Any, highest: Given, *, segment: int = 256, channel: str | None = None, **_data: Unpack[DataKeywords]
 ) -> xr.Dataset:
     """Return the spectral correlation and coherence of one channel by the fast algorithm of Antoni et al.
 
@@ -69,6 +70,7 @@ def spectral_correlation(
     >>> round(float(lines.idxmax()), 1)
     40.0
     """
+    highest = float(highest)
     rate, names = rate_of(signal), [str(name) for name in signal["channel"].values]
     name = names[0] if channel is None else channel
     if name not in names:

@@ -24,6 +24,7 @@ import xarray as xr
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of
+from gearmbs.signals.signal.units import Given
 
 LENGTH, ROUNDS = 64, 30
 ENOUGH = 1e-4
@@ -70,7 +71,7 @@ def minimum_entropy(
 @takes_data(period="time")
 def maximum_correlated_kurtosis(
     signal: Any,
-    period: float,
+    period: Given,
     *,
     shifts: int = 1,
     length: int = LENGTH,
@@ -101,6 +102,7 @@ def maximum_correlated_kurtosis(
     SignalError
         If the period is shorter than two samples, or the record than all shifts.
     """
+    period = float(period)
     samples = round(period * rate_of(signal))
     if samples < 2 or shifts < 1 or (shifts + 1) * samples >= signal.sizes["time"]:
         raise SignalError(

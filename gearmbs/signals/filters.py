@@ -18,6 +18,7 @@ import numpy as np
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import check_rate, like, rate_of
+from gearmbs.signals.signal.units import Given
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -251,10 +252,10 @@ def _valid(source: np.ndarray, taps: np.ndarray, step: int) -> np.ndarray:
 @takes_data(low="frequency", high="frequency", transition="frequency")
 def bandpass(
     signal: Any,
-    low: float,
-    high: float,
+    low: Given,
+    high: Given,
     *,
-    transition: float,
+    transition: Given,
     edges: Edges = "trim",
     attenuation: float = ATTENUATION_DB,
     **_data: Unpack[DataKeywords],
@@ -266,10 +267,10 @@ def bandpass(
     signal : xarray.DataArray
         Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
         ``channels`` and ``gaps`` as there.
-    low, high : float
-        Pass band in Hz.
-    transition : float
-        Width of each transition band in Hz.
+    low, high : float or str
+        Pass band in Hz, or as text with a unit.
+    transition : float or str
+        Width of each transition band, likewise.
     edges : {"trim", "extend"}
         See `apply_zero_phase`.
     attenuation : float
@@ -285,7 +286,7 @@ def bandpass(
     SignalError
         If the band does not fit between 0 and half the sampling rate, or the record is too short.
     """
-    taps = bandpass_taps(rate_of(signal), low, high, transition, attenuation)
+    taps = bandpass_taps(rate_of(signal), float(low), float(high), float(transition), attenuation)
     # A static load can be thousands of times the vibration; taking it out first spares the stop band.
     values, first = apply_zero_phase(signal.values - signal.values.mean(axis=0), taps, edges)
     return like(signal, values, t0=float(signal["time"].values[first]))

@@ -17,6 +17,7 @@ from gearmbs.signals.filters import bandpass
 from gearmbs.signals.rotation.phase import analytic
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of, units_of
+from gearmbs.signals.signal.units import Given
 
 Scaling = Literal["amplitude", "rms", "power", "density"]
 Progress = Callable[[float, str], None]
@@ -29,7 +30,7 @@ def spectrum(
     *,
     scaling: Scaling = "amplitude",
     window: str | tuple = "hann",
-    segment: int | float | None = None,
+    segment: Given | None = None,
     overlap: float = 0.5,
     detrend: bool = True,
     progress: Progress | None = None,
@@ -48,8 +49,8 @@ def spectrum(
         The first three divide by the window's coherent gain, the last by its noise power.
     window : str or tuple
         As for `scipy.signal.get_window`.
-    segment : int or float, optional
-        Samples (int) or seconds (float) per segment; default the whole record (one segment).
+    segment : int, float or str, optional
+        Samples (int), seconds (float) or text with a unit, per segment; default the whole record (one segment).
     overlap : float
         Fraction of overlap of successive segments, 0 <= overlap < 1.
     detrend : bool
@@ -174,7 +175,7 @@ FLOOR = 1e-12
 def power_cepstrum(
     signal: Any,
     *,
-    segment: int | float | None = None,
+    segment: Given | None = None,
     window: str | tuple = "boxcar",
     overlap: float = 0.5,
     **_data: Unpack[DataKeywords],
@@ -189,8 +190,8 @@ def power_cepstrum(
     signal : xarray.DataArray
         Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
         ``channels`` and ``gaps`` as there.
-    segment : int or float, optional
-        Samples (int) or seconds (float) per segment; default the whole record.
+    segment : int, float or str, optional
+        Samples (int), seconds (float) or text with a unit, per segment; default the whole record.
     window : str or tuple
         As for `scipy.signal.get_window`.
     overlap : float
@@ -256,9 +257,9 @@ BLOCK = 1 << 17
 @waiting("envelope")
 def envelope(
     signal: Any,
-    band: tuple[float, float] | None = None,
+    band: tuple[Given, Given] | None = None,
     *,
-    transition: float | None = None,
+    transition: Given | None = None,
     **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Magnitude of the analytic signal, after a zero-phase band-pass if a band is given.
@@ -293,10 +294,10 @@ def envelope(
 @waiting("envelope spectrum")
 def envelope_spectrum(
     signal: Any,
-    band: tuple[float, float] | None = None,
+    band: tuple[Given, Given] | None = None,
     *,
     scaling: Scaling = "amplitude",
-    segment: int | float | None = None,
+    segment: Given | None = None,
     **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Spectrum of the envelope, mean removed: modulation frequencies with their amplitudes (see `spectrum`)."""

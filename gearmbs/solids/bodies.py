@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -60,9 +60,9 @@ class Body:
     node: Node
 
     @cached_property
-    def attributes(self) -> dict[str, Any]:
+    def attributes(self) -> dict[str, object]:
         """Attributes of the body by the names of their definitions: the first value of the first field that has one."""
-        out: dict[str, Any] = {}
+        out: dict[str, object] = {}
         for number in _along(self.nodes, self.node.attributes, "next"):
             a = self.nodes[number]
             if a.kind != "ATTRIBUTE" or a.definition not in self.nodes:

@@ -10,12 +10,14 @@ import sys
 
 import pytest
 
+from gearmbs import system
 from gearmbs.campaigns import Campaign, CampaignError, Factor, FunctionSubject, make_plan
 from gearmbs.campaigns.codes import code_counts
 from gearmbs.campaigns.surroundings import refusal
 from gearmbs.studies.run import code
 from gearmbs.studies.run.code import Code, CodeChanged, code_of, running_code, what_counts
 from gearmbs.studies.run.loaded import as_loaded
+from gearmbs.system import processor_lines
 from tests.campaigns.models import PLACES, needy
 from tests.says import says
 
@@ -156,24 +158,24 @@ def test_the_processor_is_remembered_as_it_is_found_out(tmp_path):
 
 def test_what_the_processor_depends_on(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    known = {code._host(code.host_lines())}
+    known = {code._host(processor_lines())}
     for name in ("NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "GEARMBS_COMPILER"):
         with monkeypatch.context() as patch:
             patch.setenv(name, "own")
-            known.add(code._host(code.host_lines()))
+            known.add(code._host(processor_lines()))
     (tmp_path / ".numba_config.yaml").write_text("cpu_name: generic")
-    known.add(code._host(code.host_lines()))
+    known.add(code._host(processor_lines()))
     (tmp_path / ".numba_config.yaml").unlink()
-    assert code._host(code.host_lines()) in known
+    assert code._host(processor_lines()) in known
     assert len(known) == 5
     other = tmp_path / "cpuinfo"
     other.write_text(
         "processor : 0\nmodel : 1\nflags : fpu\ncpu MHz : 3000.1\n\nprocessor : 1\nmodel : 1\nflags : fpu\n"
     )
-    monkeypatch.setattr(code, "CPUINFO", other)
-    assert code.host_lines() == ["flags : fpu", "model : 1"]
-    monkeypatch.setattr(code, "CPUINFO", tmp_path / "nothing")
-    assert code.host_lines() == []
+    monkeypatch.setattr(system, "PROC", tmp_path)
+    assert processor_lines() == ["flags : fpu", "model : 1"]
+    monkeypatch.setattr(system, "PROC", tmp_path / "nothing")
+    assert processor_lines() == []
 
 
 def test_an_edit_in_the_middle_is_refused_by_name(modules, tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 
 import numpy as np
@@ -89,3 +90,38 @@ def test_data_of_the_claims_are_those_of_this_code(scripts, point):
     again = ratios(plan.subject.run(thing, lambda _: None, plan.keep))
     for name in [c for c in data if "." in c]:
         assert again[name] == pytest.approx(float(data[name][point]), rel=0.02), name
+
+
+def test_a_kept_table_is_shown_while_its_code_is_what_it_was(scripts, tmp_path, monkeypatch):
+    import kept
+
+    script = tmp_path / "made_by.py"
+    script.write_text("FACTOR = 2\n")
+    made = []
+
+    def make():
+        made.append(1)
+        return pd.DataFrame({"outcome": ["right", "refused"], "found": [1.5, None]})
+
+    monkeypatch.setattr(kept, "ROOT", tmp_path)
+    monkeypatch.setattr(kept, "TABLES", {"own": kept.Kept(make, ("made_by.py",))})
+    monkeypatch.setattr(kept, "place", lambda name: tmp_path / f"{name}.json")
+    first = kept.kept("own")
+    kept.keep("own")
+    assert len(made) == 2
+    pd.testing.assert_frame_equal(kept.kept("own"), first)
+    script.write_text('"""Words."""\n# more of them\nFACTOR = 2\n')
+    kept.kept("own")
+    assert len(made) == 2
+    script.write_text("FACTOR = 3\n")
+    kept.kept("own")
+    assert len(made) == 3
+
+
+def test_what_is_kept_has_the_rows_of_the_page(scripts):
+    import kept
+    import speed_search
+
+    found = json.loads(kept.place("speed_search").read_text(encoding="utf-8"))
+    table = pd.DataFrame(found["table"]["data"], columns=found["table"]["columns"])
+    assert table.groupby("difficulty").size().to_dict() == dict.fromkeys(speed_search.DIFFICULTIES, 40)

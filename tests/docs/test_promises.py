@@ -68,6 +68,35 @@ def test_workflows_use_what_is_there():
     assert re.findall(r'"([\d.]+)"', tried) == listed
 
 
+def test_the_recipe_asks_for_what_the_package_does():
+    """By lines, since nothing that reads YAML is needed otherwise."""
+    text = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
+    told = dict(re.findall(r'^  (\w+): "?([^"\n]+)"?$', text.partition("package:")[0], flags=re.MULTILINE))
+    assert told == {
+        "name": PROJECT["name"], "version": PROJECT["version"],
+        "python_min": PROJECT["requires-python"].removeprefix(">="),
+    }  # fmt: skip
+    run = set(
+        re.findall(r"^    - ([\w-]+) >=([\d.]+)$", text.partition("  run:")[2].partition("tests:")[0], re.MULTILINE)
+    )
+    asked = {tuple(one.split(">=")) for one in PROJECT["dependencies"]}
+    assert {(name.removesuffix("-base"), version) for name, version in run} == asked
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]["requires"]
+    assert {f"    - {one.replace('>=', ' >=')}" for one in build} <= set(text.splitlines())
+    (script,) = PROJECT["scripts"].items()
+    assert f"      - {' = '.join(script)}" in text.splitlines()
+
+
+def test_classifiers_are_those_of_what_was_run():
+    """A system counts once its row of the install page says so, and a version of Python once the workflow has it."""
+    page = (DOCS / "install.md").read_text(encoding="utf-8")
+    systems = [line for line in PROJECT["classifiers"] if line.startswith("Operating System")]
+    assert systems == ["Operating System :: POSIX :: Linux"]
+    rows = [row for row in page.splitlines() if row.startswith("| Linux on ARM, macOS on ARM, Windows")]
+    assert rows
+    assert all("**not yet**" in row for row in rows)
+
+
 def test_benchmarks_over_time_are_found():
     told = json.loads((ROOT / "benchmarks" / "asv.conf.json").read_text(encoding="utf-8"))
     assert (ROOT / "benchmarks" / told["benchmark_dir"] / "runs.py").is_file()

@@ -77,3 +77,33 @@ def test_a_housing_with_seats():
 def test_wrong_meshes_are_named(make, message):
     with pytest.raises(FlexibleError, match=message):
         make()
+
+
+@pytest.mark.parametrize("quadratic", [True, False])
+@pytest.mark.parametrize("kind", ["MeshHex", "MeshTet"])
+def test_matrices_are_those_of_scikit_fem(kind, quadratic):
+    """To the rounding of sums over elements, on a skew mesh; entries that are zero there are rounding here."""
+    from skfem.helpers import ddot, dot, eye, sym_grad, trace
+
+    material = ElasticMaterial(2.0e11, 0.28, 7800.0)
+    mesh = getattr(skfem, kind).init_tensor(*(np.linspace(0.0, a, 3) for a in (0.3, 0.2, 0.1)))
+    mesh = type(mesh)(mesh.p + 0.1 * np.array([[0, 1, 0], [0, 0, 1], [1, 0, 0]]) @ mesh.p**2, mesh.t)
+    kinds = {"MeshHex": (skfem.ElementHex1, skfem.ElementHex2), "MeshTet": (skfem.ElementTetP1, skfem.ElementTetP2)}
+    basis = skfem.Basis(mesh, skfem.ElementVector(kinds[kind][quadratic]()), intorder=5)
+    mu, nu = material.shear_modulus, material.poisson_ratio
+    lame = material.youngs_modulus * nu / ((1 + nu) * (1 - 2 * nu))
+
+    @skfem.BilinearForm
+    def stiffness(u, v, _):
+        strain = sym_grad(u)
+        return ddot(2.0 * mu * strain + lame * eye(trace(strain), 3), sym_grad(v))
+
+    @skfem.BilinearForm
+    def inertia(u, v, _):
+        return material.density * dot(u, v)
+
+    model = solid_model(mesh, material, quadratic=quadratic)
+    for own, form in ((model.stiffness, stiffness), (model.mass, inertia)):
+        theirs = form.assemble(basis).toarray()
+        bound = basis.dx.shape[1] * basis.Nbfun * np.finfo(float).eps * np.abs(theirs).max()
+        assert np.abs(own.toarray() - theirs).max() < bound

@@ -7,8 +7,11 @@ import gearmbs as gm
 
 def main(folder: Path) -> float:
     """Return the larger level of the third harmonic of the mesh, N."""
-    gears = {"teeth": (21, 34), "module": "2.5 mm", "face_width": "20 mm"}
-    healthy = gm.Case(name="healthy", gears=gears, operation={"speed": "1500 rpm", "torque": "60 N m", "duration": 0.2})
+    healthy = gm.Case(
+        name="healthy",
+        gears={"teeth": (21, 34), "module": "2.5 mm", "face_width": "20 mm"},
+        operation={"speed": "1500 rpm", "torque": "60 N m", "duration": 0.2},
+    )
     broken = healthy.changed(name="broken tooth", fault={"teeth": "broken tooth"})
     ideal = gm.IdealMesh.with_damping_ratio(healthy.pair().with_changes(backlash="0.1 mm"), "4e8 N/m", backlash=True)
     levels: list[float] = [ideal.depth]

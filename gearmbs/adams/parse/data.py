@@ -138,7 +138,7 @@ def read_matrices(path: Path) -> dict[str, np.ndarray]:
         With file and line, for another format, numbers that cannot be, and a file that is cut off.
     """
     try:
-        lines = path.read_text(errors="replace").splitlines()
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
         raise ValueError(f"FILE = {path.name}: {error.strerror}; looked for {path}") from error
 

@@ -14,6 +14,7 @@ from gearmbs.campaigns.settings import CampaignError
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from sklearn.ensemble import RandomForestClassifier
 
 # Features of vibration windows that any record offers: classical indicators, and the spectrum about the mesh
 # harmonics.
@@ -241,7 +242,7 @@ class Score:
         )
 
 
-def classifier(seed: int = 0, trees: int = TREES) -> Any:
+def classifier(seed: int = 0, trees: int = TREES) -> RandomForestClassifier:
     """Return the baseline's classifier: a random forest, the same for the same seed.
 
     Raises

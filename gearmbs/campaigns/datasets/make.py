@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 import shutil
 import tempfile
@@ -28,6 +27,7 @@ from gearmbs.campaigns.plans.factors import Specimens
 from gearmbs.campaigns.settings import CampaignError
 from gearmbs.campaigns.stored.exports import ROWS_A_FILE, check_card, place
 from gearmbs.files import whole_file
+from gearmbs.system import rename_over
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -209,7 +209,7 @@ def _written_first(out: Path) -> Iterator[Path]:
                 path.unlink()
         for name in found:
             (out / name).parent.mkdir(exist_ok=True)
-            os.replace(new / name, out / name)
+            rename_over(new / name, out / name)
 
 
 def _individuals(campaign: Campaign) -> str:

@@ -11,6 +11,7 @@ from gearmbs.campaigns.datasets.layers import STOP, Noise
 from gearmbs.campaigns.settings import CampaignError, whole
 from gearmbs.signals import ModalPath, Mode, discrete_random, rate_of, sample
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
+from gearmbs.signals.signal.units import Given
 
 LINES = 64
 """Bands of the identified density: wider than lines and their sidebands, narrower than resonances of a housing."""
@@ -34,7 +35,7 @@ FEWEST = 4096
 
 
 @takes_data(data_rate="frequency")
-def identify_noise(signal: Any, data_rate: float | None = None, **_data: Unpack[DataKeywords]) -> tuple[Noise, ...]:
+def identify_noise(signal: Any, data_rate: Given | None = None, **_data: Unpack[DataKeywords]) -> tuple[Noise, ...]:
     """Return the noise of each channel of a recording.
 
     The recording is parted into what can be predicted and what cannot, see `gearmbs.signals.discrete_random`; the
@@ -55,6 +56,7 @@ def identify_noise(signal: Any, data_rate: float | None = None, **_data: Unpack[
         If the recording is too short or slower than the data set, or a channel stands still.
     """
     if data_rate is not None:
+        data_rate = float(data_rate)
         if rate_of(signal) < data_rate:
             raise CampaignError(
                 f"recording: {rate_of(signal):g} Hz is below the data set's {data_rate:g} Hz, of whose upper band it "

@@ -32,6 +32,7 @@ from gearmbs.dae.integrators.options import ROUNDED_STEP, Options, beside
 from gearmbs.dae.integrators.records import remark_on_unresolved
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
+from gearmbs.logs import logger
 
 if TYPE_CHECKING:
     from sksundae.ida import IDA
@@ -93,6 +94,7 @@ class _Messages(io.TextIOBase):
         found = self.PATTERN.match(text)
         if found is not None:
             self.text = " ".join(found[1].split())
+            logger("dae").debug("SUNDIALS: %s", self.text)
         elif not (getattr(self._own, "ending", False) and text == "\n"):
             self.through.write(text)
         self._own.ending = found is not None

@@ -20,27 +20,27 @@ class Measured:
             raise ValueError("the solution does not know its mechanism, so nothing can be asked of it by name")
         return mechanism.measures(self)
 
-    def joint_angle(self, joint) -> np.ndarray:
+    def joint_angle(self, joint: object) -> np.ndarray:
         """Return the rotation of a joint's I about z_J with full turns counted, shape (m,), rad; by joint or name."""
         return self._measures().angle(joint)
 
-    def joint_displacement(self, joint) -> np.ndarray:
+    def joint_displacement(self, joint: object) -> np.ndarray:
         """Return the way of a joint's I from J along z_J, shape (m,), m; by joint or name."""
         return self._measures().displacement(joint)
 
-    def joint_rate(self, joint) -> np.ndarray:
+    def joint_rate(self, joint: object) -> np.ndarray:
         """Return the speed of a joint's I from J about z_J, rad/s, or along it of one that does not turn, m/s."""
         return self._measures().rate(joint)
 
-    def marker_position(self, marker) -> np.ndarray:
+    def marker_position(self, marker: object) -> np.ndarray:
         """Return the origin of a marker, shape (m, 3), m, global; by marker or name, or of a body's own frame."""
         return self._measures().place(marker)
 
-    def marker_velocity(self, marker) -> np.ndarray:
+    def marker_velocity(self, marker: object) -> np.ndarray:
         """Return the velocity of a marker's origin, shape (m, 3), m/s, global; arguments as of `marker_position`."""
         return self._measures().velocity(marker)
 
-    def deflection(self, marker) -> tuple[np.ndarray, np.ndarray]:
+    def deflection(self, marker: object) -> tuple[np.ndarray, np.ndarray]:
         """Return displacement (m) and rotation (rad) by deformation at a marker of a modal body, each (m, 3).
 
         In the body's axes, against the undeformed body about the same centre of mass; by marker or name. Markers may
@@ -48,7 +48,7 @@ class Measured:
         """
         return self._measures().deflection(marker)
 
-    def state(self, state) -> np.ndarray:
+    def state(self, state: object) -> np.ndarray:
         """Return a user-defined state of the mechanism, shape (m,); by state or name."""
         return self._measures().state(state)
 

@@ -23,7 +23,7 @@ from gearmbs.dae.model import evaluator as outputs
 from gearmbs.dae.model.model import Configuration
 from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import DAEProblem, ModelError
-from gearmbs.dae.result import DAEResult, Status
+from gearmbs.dae.result import DAEResult, SolverStats, Status
 from gearmbs.dae.results.frames import Evaluated
 from gearmbs.dae.results.measured import Measured
 from gearmbs.dae.state import State
@@ -166,7 +166,7 @@ class Solution(Measured, Shown):
         return Configuration.of(self._records.pose[k], self._records.bodies)
 
     @property
-    def stats(self):
+    def stats(self) -> SolverStats:
         """Counts of steps, evaluations and times."""
         return self.result.stats
 

@@ -28,6 +28,7 @@ from numba import types
 from numba.extending import intrinsic, typeof_impl
 
 from gearmbs.kernels import locks
+from gearmbs.logs import tell
 
 CompilationError = numba.NumbaError
 """What numba raises where a function cannot be compiled."""
@@ -186,7 +187,7 @@ def keeping(module: str, inner: str = "") -> Iterator[None]:
 
 
 def _say(line: str) -> None:
-    print(f"gearmbs: {line}", file=sys.stderr, flush=True)
+    tell("kernels", line)
 
 
 _say_once = functools.cache(_say)

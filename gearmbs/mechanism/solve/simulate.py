@@ -25,6 +25,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.watched import Stream, Watch
 from gearmbs.dae.state import History, State, check_state
 from gearmbs.kernels.jit import njit
+from gearmbs.logs import log_run
 from gearmbs.mechanism.checks import (
     check_mechanism,
     locking_remark,
@@ -312,6 +313,7 @@ def simulate(
     try:
         with bar as report, raised_errors(mechanism.functions.values()):
             result = _integrated(name, problem, t_eval, every_step, stream, tol=tol, progress=report, **settings)
+        log_run("mechanism", f"{mechanism.name} by {name}", result)
     except ModelError as error:
         if result is not None and stream is None:
             cut = replace(result, status=Status.USER_ERROR, message=str(error))

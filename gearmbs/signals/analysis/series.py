@@ -24,6 +24,7 @@ from gearmbs.signals.analysis.sections import ReadingKeywords, sections
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.files.table import known_endings
+from gearmbs.system import rename_over
 from gearmbs.wording import warn
 
 Progress = Callable[[str, float], None]
@@ -361,7 +362,7 @@ def _write_whole(table: pd.DataFrame, store: Path) -> None:
             table.to_parquet(part)
         else:
             table.to_csv(part, index=False, float_format=_shortest)
-        os.replace(part, store)
+        rename_over(part, store)
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)

@@ -44,7 +44,7 @@ from gearmbs.signals.rotation.shaft import shaft_phase
 from gearmbs.signals.rotation.sweep import remark_sweep
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, units_of
-from gearmbs.signals.signal.units import unit_dimension
+from gearmbs.signals.signal.units import Given, unit_dimension
 from gearmbs.signals.spectra import kurtogram
 from gearmbs.units import to_si
 
@@ -177,7 +177,7 @@ def diagnose_bearing(
     bearing: Any,
     speed: Any = None,
     *,
-    band: tuple[float, float] | None = None,
+    band: tuple[Given, Given] | None = None,
     phase: xr.DataArray | None = None,
     shafts: Sequence[float] | None = None,
     slip: float = SLIP,
@@ -253,7 +253,8 @@ def diagnose_bearing(
     highest = max(order for lines in known for order in lines.orders.values()) * told
     _check_record(signal.sizes["time"], rate, told, None if phase is not None else highest)
     others = _other_shafts(signal, known, shafts)
-    bands, heard = _heard(signal, told, highest, band, phase, progress)
+    wanted = None if band is None else (float(band[0]), float(band[1]))
+    bands, heard = _heard(signal, told, highest, wanted, phase, progress)
 
     def judge_at(turns: float) -> Iterator[list[Judged]]:
         for spectra in heard.values():

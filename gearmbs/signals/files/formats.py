@@ -12,6 +12,8 @@ from typing import Any
 
 import xarray as xr
 
+from gearmbs.files import LONGEST_STEM
+from gearmbs.logs import logger
 from gearmbs.progress import staged
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.csv import CUT
@@ -20,6 +22,7 @@ from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
 from gearmbs.signals.signal.record import Progress, Record, checked_gaps, columns_asked, record_of, signal_from
 from gearmbs.signals.signal.signal import as_signal
 from gearmbs.signals.signal.units import check_units
+from gearmbs.system import rename_over, umask
 from gearmbs.wording import warn
 
 FORMATS = tuple(TABLE)
@@ -94,6 +97,8 @@ def read_signal(
         signal = signal_from(
             record, path, rate=hertz, units=units, speed=constant, teeth=teeth, channels=channels, gaps=gaps
         )
+    sizes = signal.sizes
+    logger("signals").debug("read %s as %s: %d channels of %d samples", path, format, sizes["channel"], sizes["time"])
     return with_speed(signal, speed) if is_curve(speed) else signal
 
 
@@ -160,15 +165,14 @@ def write_record(record: Record, path: Path, format: str | None = None, progress
         raise SignalFileError(path, known.not_written[path.suffix.lower()])
     if not path.parent.is_dir():
         raise SignalFileError(path, f"there is no folder {path.parent}; make it first")
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem[:LONGEST_STEM]}.", suffix=".part", dir=path.parent)
     os.close(handle)
     part = Path(name)
     try:
         known.write(record, part, progress)
-        mask = os.umask(0)
-        os.umask(mask)
-        part.chmod(0o666 & ~mask)
-        part.replace(path)
+        part.chmod(0o666 & ~umask())
+        rename_over(part, path)
+        logger("files").debug("wrote %s", path)
     except SignalFileError as exc:
         raise SignalFileError(path, exc.fault) from exc
     finally:

@@ -19,6 +19,7 @@ from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kai
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.given import speed_curve
 from gearmbs.signals.signal.signal import rate_of
+from gearmbs.signals.signal.units import Given
 from gearmbs.wording import warn
 
 LINE_ATTENUATION_DB = 60.0
@@ -206,10 +207,10 @@ def pulse_edges(
 @takes_data(frequency="frequency", half_bandwidth="frequency")
 def phase_from_line(
     signal: Any,
-    frequency: float,
+    frequency: Given,
     order: float,
     *,
-    half_bandwidth: float | None = None,
+    half_bandwidth: Given | None = None,
     **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Angle (rad) of the shaft from the phase of one line, such as a gear mesh harmonic.
@@ -223,13 +224,13 @@ def phase_from_line(
     signal : xarray.DataArray
         Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
         ``channels`` and ``gaps`` as there.
-    frequency : float
-        Mean frequency of the line in Hz.
+    frequency : float or str
+        Mean frequency of the line, Hz or text.
     order : float
         Line frequency over shaft frequency, e.g. the tooth count times the harmonic.
-    half_bandwidth : float, optional
-        Largest deviation to follow, in Hz; default 0.15 shaft frequencies, which keeps out sidebands of the shaft and
-        of most mating shafts.
+    half_bandwidth : float or str, optional
+        Largest deviation to follow, Hz or text; default 0.15 shaft frequencies, which keeps out sidebands of the
+        shaft and of most mating shafts.
 
     Returns
     -------
@@ -242,7 +243,7 @@ def phase_from_line(
     SignalError
         If the record is too short for the filter, or a parameter is out of range.
     """
-    rate = rate_of(signal)
+    rate, frequency = rate_of(signal), float(frequency)
     if not 0.0 < frequency < rate / 2 or not order > 0.0:
         raise SignalError(
             f"frequency, order: must be positive and below {rate / 2:g} Hz, got {frequency!r} and {order!r}"

@@ -33,6 +33,7 @@ from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.angular import time_synchronous_average
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of
+from gearmbs.signals.signal.units import Given
 
 FLOOR = 1e-12
 """Least magnitude of a line, of the largest, whose logarithm is taken."""
@@ -86,7 +87,7 @@ def _periodic(values: np.ndarray, at: np.ndarray) -> np.ndarray:
 def discrete_random(
     signal: Any,
     *,
-    delay: float | None = None,
+    delay: Given | None = None,
     segment: int | None = None,
     **_data: Unpack[DataKeywords],
 ) -> tuple[xr.DataArray, xr.DataArray]:
@@ -100,8 +101,8 @@ def discrete_random(
     signal : xarray.DataArray
         Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
         ``channels`` and ``gaps`` as there.
-    delay : float, optional
-        s; longer than the memory of what is random, some turns of the shaft. Default: one segment.
+    delay : float or str, optional
+        s or text; longer than the memory of what is random, some turns of the shaft. Default: one segment.
     segment : int, optional
         Samples of the filter: its resolution, rate/segment, has to part neighbouring lines. Default: a power of two, a
         32nd of the record at most.
@@ -113,7 +114,7 @@ def discrete_random(
     """
     rate, n = rate_of(signal), signal.sizes["time"]
     length = 1 << int(np.log2(max(n // 32, 1))) if segment is None else int(segment)
-    shift = length if delay is None else round(delay * rate)
+    shift = length if delay is None else round(float(delay) * rate)
     if not 16 <= length <= n // 4:
         raise SignalError(f"segment: must lie between 16 and a quarter of the record ({n // 4} samples), got {length}")
     if not 0 < shift <= n // 4:
@@ -158,7 +159,7 @@ def prewhiten(signal: Any, **_data: Unpack[DataKeywords]) -> xr.DataArray:
 
 @takes_data(width="frequency")
 @waiting("parting lines and noise")
-def level_lines(signal: Any, width: float, most: float = 10.0, **_data: Unpack[DataKeywords]) -> xr.DataArray:
+def level_lines(signal: Any, width: Given, most: float = 10.0, **_data: Unpack[DataKeywords]) -> xr.DataArray:
     """Flatten a spectrum over neighbourhoods, and cut its lines to a multiple of what is round them.
 
     Parameters
@@ -166,13 +167,13 @@ def level_lines(signal: Any, width: float, most: float = 10.0, **_data: Unpack[D
     signal : xarray.DataArray
         Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
         ``channels`` and ``gaps`` as there.
-    width : float
-        Of a neighbourhood, Hz.
+    width : float or str
+        Of a neighbourhood, Hz or text.
     most : float
         Magnitude of a line by the median of its neighbourhood, at most. With 1 this is nearly `prewhiten`; blows at
         perfectly even times, as simulated ones are, need more to be seen.
     """
-    rate, n = rate_of(signal), signal.sizes["time"]
+    rate, n, width = rate_of(signal), signal.sizes["time"], float(width)
     if not (rate / n < width < rate / 2 and most >= 1.0):
         raise SignalError(
             f"width: must lie between {rate / n:.3g} and {rate / 2:g} Hz, most be 1 or more, got {width!r}, {most!r}"
@@ -196,10 +197,10 @@ def level_lines(signal: Any, width: float, most: float = 10.0, **_data: Unpack[D
 @waiting("parting lines and noise")
 def edit_cepstrum(
     signal: Any,
-    frequencies: Sequence[float] | float,
+    frequencies: Given | Sequence[Given],
     *,
     width: float = 0.02,
-    keep_below: float | None = None,
+    keep_below: Given | None = None,
     **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Level families of equally spaced lines: notches in the real cepstrum at multiples of 1/f.
@@ -209,12 +210,12 @@ def edit_cepstrum(
     signal : xarray.DataArray
         Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
         ``channels`` and ``gaps`` as there.
-    frequencies : float or sequence of float
-        Spacings of the families, Hz: shafts and mesh frequencies.
+    frequencies : float, str or sequence of these
+        Spacings of the families, Hz or texts: shafts and mesh frequencies.
     width : float
         Half width of a notch as a share of its quefrency, at least one sample.
-    keep_below : float, optional
-        Quefrency below which nothing is edited, s; default half the shortest spacing's.
+    keep_below : float or str, optional
+        Quefrency below which nothing is edited, s or text; default half the shortest spacing's.
 
     Returns
     -------
@@ -227,7 +228,7 @@ def edit_cepstrum(
         raise SignalError(
             f"frequencies: must be above two lines of the record ({2.0 * rate / n:.3g} Hz), got {frequencies!r}"
         )
-    low = 0.5 / spacings.max() if keep_below is None else keep_below
+    low = 0.5 / spacings.max() if keep_below is None else float(keep_below)
     lifter = np.ones(n // 2 + 1)
     for spacing in spacings:
         for k in range(1, int(spacing * n / rate / 2.0) + 1):

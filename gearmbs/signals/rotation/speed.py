@@ -15,6 +15,7 @@ from gearmbs.signals.rotation.mesh_lines import LEAST_SPREAD_DB, Explained, Line
 from gearmbs.signals.rotation.phase import phase_from_line
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import rate_of, require
+from gearmbs.signals.signal.units import Given
 from gearmbs.signals.spectra import periodograms
 from gearmbs.wording import warn
 
@@ -119,7 +120,7 @@ def estimate_speed(
     signal: Any,
     teeth: int | Sequence[int] | None = None,
     *,
-    speed_range: tuple[float, float] | None = None,
+    speed_range: tuple[Given, Given] | None = None,
     **_data: Unpack[DataKeywords],
 ) -> SpeedEstimate:
     """Find the gear mesh frequency, and with the tooth count the speed, from the record alone.
@@ -141,8 +142,8 @@ def estimate_speed(
         ``units``, ``channels`` and ``gaps`` as there.
     teeth : int or sequence, optional
         Tooth count of the wheel whose speed is wanted (first); default the signal's.
-    speed_range : (float, float), optional
-        Lowest and highest speed to look for in rad/s. Default: from 240 rpm to where two harmonics
+    speed_range : pair of float or str, optional
+        Lowest and highest speed to look for, rad/s or texts. Default: from 240 rpm to where two harmonics
         fit below half the sampling rate.
 
     Returns
@@ -156,7 +157,8 @@ def estimate_speed(
     SignalError
         If the range is empty, the record is too short, or no comb stands out.
     """
-    found = followed_comb(signal, teeth, speed_range)
+    span = None if speed_range is None else (float(speed_range[0]), float(speed_range[1]))
+    found = followed_comb(signal, teeth, span)
     if found.doubt:
         warn(found.doubt, UserWarning)
     return found

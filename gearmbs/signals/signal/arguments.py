@@ -13,7 +13,8 @@ from gearmbs.units import to_si
 if TYPE_CHECKING:
     import xarray as xr
 
-    from gearmbs.signals.signal.inputs import Given, Units
+    from gearmbs.signals.signal.inputs import Units
+    from gearmbs.signals.signal.units import Given
 
 GIVEN = ("rate", "units", "channels", "gaps")
 """Keywords of `to_signal` that such functions have in addition to their own."""
@@ -47,7 +48,11 @@ def takes_data(**dimensions: str) -> Callable[[F], F]:
     def wider(function: F) -> F:
         own = inspect.signature(function)
         places = list(own.parameters)
-        extra = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in GIVEN]
+        told = DataKeywords.__annotations__
+        extra = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=told[name].__forward_arg__)
+            for name in GIVEN
+        ]
         shown = [p for p in own.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
         rest = [
             p for p in own.parameters.values() if p.kind is inspect.Parameter.VAR_KEYWORD and p.name != FOR_CHECKERS

@@ -14,10 +14,9 @@ from gearmbs.signals.files.simulated import holds_ring, read_any, record_signal,
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed, is_curve, with_speed
 from gearmbs.signals.signal.record import without_gaps
 from gearmbs.signals.signal.signal import as_signal, make_signal, with_metadata
-from gearmbs.signals.signal.units import check_units
+from gearmbs.signals.signal.units import Given, check_units
 
 Units = str | Sequence[str] | Mapping[str, str]
-Given = float | str
 
 
 def to_signal(

@@ -10,6 +10,9 @@ from typing import Any
 from gearmbs.signals.errors import SignalError
 from gearmbs.wording import did_you_mean
 
+Given = float | str
+"""A quantity as callers give it: a number in SI, or text with a unit."""
+
 # The dimension of a unit of vibration (displacement, velocity, acceleration or force) and its factor to SI.
 
 

@@ -40,7 +40,18 @@ from gearmbs.studies.case.sections import (
 from gearmbs.studies.case.texts import case_toml
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from gearmbs.gears import GearPair
+    from gearmbs.studies.case.keywords import (
+        ContactKeywords,
+        FaultKeywords,
+        FrictionKeywords,
+        GearsKeywords,
+        OperationKeywords,
+        ShaftsKeywords,
+        SolverKeywords,
+    )
 
 SIGNAL_RATE, OUTPUT_RATE = 12800.0, 51200.0
 """Least sampling rates, Hz, where a case gives none: natural frequencies do not fall with the speed."""
@@ -58,16 +69,16 @@ paper's pair, whose teeth are pressed in by 24 um, harmonics were 0.9 % off with
 
 
 class CaseKeywords(TypedDict, total=False):
-    """Fields of a `Case` as they are given, for type checkers: sections, or some of their fields by name."""
+    """Fields of a `gearmbs.studies.Case`."""
 
     name: str
-    gears: Gears | dict[str, Any]
-    shafts: Shafts | dict[str, Any]
-    operation: Operation | dict[str, Any]
-    fault: FaultSettings | dict[str, Any]
-    contact: Contact | dict[str, Any]
-    friction: FrictionSettings | dict[str, Any]
-    solver: Solver | dict[str, Any]
+    gears: Gears | GearsKeywords
+    shafts: Shafts | ShaftsKeywords
+    operation: Operation | OperationKeywords
+    fault: FaultSettings | FaultKeywords
+    contact: Contact | ContactKeywords
+    friction: FrictionSettings | FrictionKeywords
+    solver: Solver | SolverKeywords
 
 
 class Case(Section, Shown):
@@ -95,6 +106,10 @@ class Case(Section, Shown):
     contact: Contact = Field(default_factory=Contact)
     friction: FrictionSettings = Field(default_factory=FrictionSettings)
     solver: Solver = Field(default_factory=Solver)
+
+    if TYPE_CHECKING:  # pydantic makes it of the fields, which take more than they hold
+
+        def __init__(self, **sections: Unpack[CaseKeywords]) -> None: ...
 
     @classmethod
     def label(cls, data: Any) -> str:
@@ -271,7 +286,7 @@ class Case(Section, Shown):
         return {name: part.settings() if isinstance(part, Section) else part for name, part in parts.items()}
 
 
-def make_case(data: dict[str, Any], source: str = "case") -> Case:
+def make_case(data: Mapping[str, object], source: str = "case") -> Case:
     """Return a validated case from nested dictionaries.
 
     Raises

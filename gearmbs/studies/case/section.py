@@ -190,7 +190,7 @@ class Section(BaseModel, metaclass=_OneError):
         """Return all settings, quantities as the user wrote them, else in SI."""
         return {**self.model_dump(), **self.written}
 
-    def with_settings(self, changes: dict[str, Any]) -> dict[str, Any]:
+    def with_settings(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Return all settings with some changed."""
         return {**self.settings(), **changes}
 

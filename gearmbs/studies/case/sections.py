@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -17,7 +17,10 @@ from gearmbs.units import to_si
 from gearmbs.wording import warn
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     from gearmbs.gears import ContactLaw, FlankFriction, GearSpec
+    from gearmbs.studies.case import keywords as told
 
     IntegratorName = str
     FormulationName = str
@@ -78,6 +81,10 @@ class Gears(Section):
     density: q.WheelDensity = 7850.0
     youngs_modulus: q.Modulus = 2.07e11
     poisson_ratio: q.PoissonRatio = 0.29
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **fields: Unpack[told.GearsKeywords]) -> None: ...
 
     @model_validator(mode="after")
     def _radii(self) -> Gears:
@@ -146,6 +153,10 @@ class Shafts(Section):
     length: q.ShaftLength = 0.200
     density: q.Density = 7850.0
 
+    if TYPE_CHECKING:
+
+        def __init__(self, **fields: Unpack[told.ShaftsKeywords]) -> None: ...
+
 
 INPUT_TORQUE = "torque is that of the driven wheel: give the driver's times z_2 / z_1 there"
 """What is said to somebody who has the other torque."""
@@ -173,6 +184,10 @@ class Operation(Section):
     settling: q.Settling = 0.05
     duration: q.Duration = LONGEST
 
+    if TYPE_CHECKING:
+
+        def __init__(self, **fields: Unpack[told.OperationKeywords]) -> None: ...
+
     @model_validator(mode="after")
     def _span(self) -> Operation:
         ends = [points[-1][0] for points in (self.speed_curve, self.torque_curve) if points]
@@ -192,7 +207,7 @@ class Operation(Section):
             del data["duration"]
         return data
 
-    def with_settings(self, changes: dict[str, Any]) -> dict[str, Any]:
+    def with_settings(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Return all settings with some changed; the length of the old record says nothing of a new curve's.
 
         Warns
@@ -259,6 +274,10 @@ class FaultSettings(Section):
     backlash: q.Backlash = 0.0001
     teeth: ToothFaults = ()
 
+    if TYPE_CHECKING:
+
+        def __init__(self, **fields: Unpack[told.FaultKeywords]) -> None: ...
+
 
 class Contact(Section):
     """IMPACT law of the paper's eq. (10)-(11): stiffness in N/m^e by text, e.g. "2.9852e5 N/mm^1.3"."""
@@ -270,6 +289,10 @@ class Contact(Section):
     damping: float | str = "298.52 N s/mm"
     depth: q.Depth = 0.0001
     slices: int | None = Field(default=None, ge=1)
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **fields: Unpack[told.ContactKeywords]) -> None: ...
 
     @model_validator(mode="after")
     def _readable(self) -> Contact:
@@ -302,6 +325,10 @@ class FrictionSettings(Section):
     dynamic: float = Field(default=0.05, ge=0)
     static_speed: q.SlidingSpeed = 0.1
     dynamic_speed: q.SlidingSpeed = 1.0
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **fields: Unpack[told.FrictionKeywords]) -> None: ...
 
     @cached_property
     def law(self) -> FlankFriction:
@@ -342,6 +369,10 @@ class Solver(Section):
     output_rate: q.SamplingRate = None
     signal_rate: q.SamplingRate = None
     lump: Annotated[bool | None, BeforeValidator(_flag_or_none)] = None
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **fields: Unpack[told.SolverKeywords]) -> None: ...
 
     @cached_property
     def used_tolerance(self) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -31,6 +31,9 @@ from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.run.store import save_study
 from gearmbs.studies.trains import run_trains, train_signal
 from gearmbs.units import Quantity, to_si
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PRESSURES = {"low": 1e6, "high": 5e6}
 """Pa, as the paper has them."""
@@ -264,7 +267,7 @@ class BenchStudy:
         lines += ["", "## Choices", "", markdown_table(BenchChoice._fields, bench_choices(self.settings))]
         return "\n".join(lines) + "\n"
 
-    def figure(self, load: str):
+    def figure(self, load: str) -> Figure:
         """Return the bars of both sensors, and of the pair, at a load: a panel each."""
         from gearmbs.view import gmf_bars
         from gearmbs.view.figures.style import look, new_figure
@@ -281,7 +284,7 @@ class BenchStudy:
                 )
         return figure
 
-    def verdict_figure(self):
+    def verdict_figure(self) -> Figure:
         """Return the verdicts on the three claims with their numbers: a row a claim, a column a place of judgement."""
         from textwrap import fill
 
@@ -310,7 +313,7 @@ class BenchStudy:
                 spine.set_visible(False)
         return figure
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, Figure]:
         """Return the bars at each load and the verdicts, by name."""
         return {f"{load}_load": self.figure(load) for load in PRESSURES} | {"verdicts": self.verdict_figure()}
 

@@ -32,6 +32,8 @@ from gearmbs.studies.trains import run_trains
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from gearmbs.dae.analyses.modes import Modes
 
 HELIX = math.radians(14.0)
@@ -227,7 +229,7 @@ class GearboxStudy:
         lines += ["# Choices", "", markdown_table(BenchChoice._fields, gearbox_choices(self.settings))]
         return "\n".join(lines) + "\n"
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, Figure]:
         """Return the Campbell diagram, and housing and bearings along the run-up, by name."""
         from gearmbs.view import campbell_plot
         from gearmbs.view.figures.style import look, new_figure

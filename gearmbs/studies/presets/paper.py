@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import xarray as xr
@@ -34,6 +34,9 @@ from gearmbs.studies.presets.paper_cases import (
 from gearmbs.studies.run.parallel import run_cases
 from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.run.store import save_study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TARGET_RMS = 1.0
 """RMS, m/s^2, to which the healthy signal at low load is scaled; the paper's own value is not published."""
@@ -119,7 +122,7 @@ class PaperStudy(Shown):
         texts = {"gmf_rms.csv": self.to_csv, "report.md": lambda: paper_report(self)}
         return save_study(folder, {"paper.nc": self.records}, texts, self.figures)
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, Figure]:
         """Return figures 5 and 7 of the paper, the bars at low and at high load, by name."""
         from gearmbs.view import gmf_bars
 

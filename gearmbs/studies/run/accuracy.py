@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.mechanism import Mechanism
+    from gearmbs.studies.case.keywords import ContactKeywords
 
 COARSER = 10.0
 """Tolerance of the twin over that of the run: a decade. The twin costs 0.7 of the run, with half the slices 0.65."""
@@ -244,7 +245,7 @@ def _add_errors(series: xr.DataArray, other: xr.DataArray, share: float, worst: 
 
 def _at(case: Case, tolerance: float, slices: int) -> Case:
     """Return a case at a tolerance and with so many slices of the face, one as lumped as the given one."""
-    contact: dict[str, Any] = {} if slices == case.pair().face_slices else {"slices": slices}
+    contact: ContactKeywords = {} if slices == case.pair().face_slices else {"slices": slices}
     return case.changed(solver={"tolerance": tolerance, "lump": case.lump}, contact=contact)
 
 

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from gearmbs.files import write_whole
+from gearmbs.system import knows_processes, process_of, space_of_processes
 
 T = TypeVar("T")
 
@@ -111,8 +112,7 @@ def claimed(ledger: Ledger, job: Any, work: Callable[[Claim], T]) -> T:
 
 def take(path: Path) -> Claim | None:
     """Claim a job; None if somebody is at work on it. A claim that is void is taken over, and the attempts counted."""
-    if os.name == "nt":
-        # signal 0, which tells whether a process lives, is Ctrl-C there
+    if not knows_processes():
         return Claim(path, 0)
     attempts = 0
     for _ in range(3):
@@ -124,7 +124,7 @@ def take(path: Path) -> Claim | None:
             attempts = max(attempts, int((_read(path) or {}).get("attempts", 0)) + 1)
             path.unlink(missing_ok=True)
             continue
-        with os.fdopen(handle, "w") as file:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
             json.dump({**_me(), "taken": time.time(), "attempts": attempts}, file)
         return Claim(path, attempts)
     return None
@@ -193,7 +193,7 @@ def _unchanged(path: Path, stamp: os.stat_result) -> float:
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
-        claim = json.loads(path.read_text())
+        claim = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return claim if isinstance(claim, dict) and {"host", "pid", "started"} <= claim.keys() else None
@@ -215,34 +215,5 @@ def _alive(claim: dict[str, Any], path: Path, stamp: os.stat_result) -> bool:
 
 def _me() -> dict[str, Any]:
     """Return by what a process is known: containers may share a host's name, and not its numbers of processes."""
-    space = []
-    for read in (lambda: Path("/proc/sys/kernel/random/boot_id").read_text(), lambda: os.readlink("/proc/self/ns/pid")):
-        with suppress(OSError):
-            space.append(read().strip())
     started, _ = process_of(os.getpid())
-    return {"host": socket.gethostname(), "space": " ".join(space), "pid": os.getpid(), "started": started}
-
-
-def process_of(pid: int) -> tuple[str | None, str]:
-    """Return when a process of this machine began, in its own units, None if there is none; and its state, "T" if it
-    is stopped."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        if Path("/proc/self/stat").exists():
-            return None, ""
-        try:
-            os.kill(pid, 0)
-        except OSError:
-            return None, ""
-        return "unknown", ""
-    return (None if fields[0] in "ZX" else fields[19]), "T" if fields[0] in "Tt" else fields[0]
-
-
-def spent(pid: int) -> float | None:
-    """Return the processor time of a process of this machine in its own units; None where that is not known."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return None
-    return float(fields[11]) + float(fields[12])
+    return {"host": socket.gethostname(), "space": space_of_processes(), "pid": os.getpid(), "started": started}

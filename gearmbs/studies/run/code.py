@@ -40,6 +40,7 @@ from typing import Any
 
 from gearmbs.files import write_whole
 from gearmbs.studies.run.loaded import MESSAGES_FROM, as_loaded
+from gearmbs.system import processor_lines, processor_name, user_cache
 
 PACKAGE = Path(__file__).parents[2]
 
@@ -406,12 +407,12 @@ class _Memory:
     """
 
     def __init__(self, name: str = "sources.json") -> None:
-        home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-        self.path = Path(home, "gearmbs", name)
+        cache = user_cache()
+        self.path = None if cache is None else cache / "gearmbs" / name
         self.known, self.new = dict[str, str](), dict[str, str]()
         with suppress(OSError, ValueError):
-            known = json.loads(self.path.read_text())
-            if known.pop("check") == _check(known):
+            known = json.loads("{}" if self.path is None else self.path.read_text(encoding="utf-8"))
+            if known and known.pop("check") == _check(known):
                 self.known = known
 
     def of(self, name: str, path: Path) -> tuple[str, list[str]]:
@@ -430,7 +431,7 @@ class _Memory:
 
     def keep(self) -> None:
         """Write down what was found out; where that cannot be done it is found out again."""
-        if self.new:
+        if self.new and self.path is not None:
             kept = self.known if len(self.known) <= MOST_KNOWN else self.new
             with suppress(OSError):
                 write_whole(self.path, json.dumps({**kept, "check": _check(kept)}))
@@ -456,7 +457,7 @@ def processor() -> str:
     if "numba" in sys.modules:
         return _processor()
     # who only drives, or simulates without kernels, loads no compiler for it
-    host = host_lines()
+    host = processor_lines()
     if not host:
         return _processor()
     memory, key = _Memory("processors.json"), _host(host)
@@ -469,29 +470,12 @@ def processor() -> str:
     return memory.known[key]
 
 
-CPUINFO = Path("/proc/cpuinfo")
-OF_HOST = (
-    "vendor_id", "cpu family", "model", "model name", "stepping", "flags",
-    "CPU implementer", "CPU architecture", "CPU variant", "CPU part", "Features",
-)  # fmt: skip
-"""What Linux tells of a processor that a compiler tells processors apart by: of x86, then of ARM."""
-
-
-def host_lines() -> list[str]:
-    """Return what the system tells of its processors, each line once; nothing where it tells nothing."""
-    try:
-        lines = CPUINFO.read_text().splitlines()
-    except OSError:
-        return []
-    return sorted({line for line in lines if line.partition(":")[0].strip() in OF_HOST})
-
-
 def _host(lines: list[str]) -> str:
     """Return a digest of all that the processor that kernels are made for depends on."""
     options = sorted(item for item in os.environ.items() if item[0].startswith(("NUMBA_", "GEARMBS_COMPILER")))
     # numba reads its options from there, too
     file = Path(".numba_config.yaml")
-    beside = file.read_text() if file.is_file() else ""
+    beside = file.read_text(encoding="utf-8") if file.is_file() else ""
     makers = [path.read_bytes() for path in sorted((PACKAGE / "kernels").rglob("*.py"))]
     makers.append(Path(__file__).read_bytes())
     versions = platform.python_version(), _installed_as("numba"), _installed_as("llvmlite")
@@ -504,7 +488,7 @@ def _processor() -> str:
 
     if PLAIN:
         # what the compiler finds out is told by private parts only
-        return platform.processor() or platform.machine()
+        return processor_name()
     from gearmbs.kernels.cache import target
 
     name, features = target()

@@ -21,7 +21,6 @@ import multiprocessing
 import os
 import pickle
 import queue
-import signal
 import sys
 import threading
 import time
@@ -33,7 +32,9 @@ from multiprocessing.connection import Connection, wait
 from types import ModuleType
 from typing import Any
 
-from gearmbs.studies.run.claims import STOPPED, Claimed, Ledger, owner, process_of, spent, vacant
+from gearmbs.logs import logger
+from gearmbs.studies.run.claims import STOPPED, Claimed, Ledger, owner, vacant
+from gearmbs.system import deaf, leave_interrupts_to_parent, process_of, spent
 from gearmbs.wording import warn
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -45,6 +46,10 @@ REPORT_SECONDS = 0.2
 
 PROGRESS, RESULT, CLAIMED, FAILURE, DEATH, REFUSED = "progress", "result", "claimed", "failure", "death", "refused"
 ALIVE = "alive"
+ENDS = {RESULT: "done", CLAIMED: "claimed elsewhere", FAILURE: "failed", DEATH: "process ended", REFUSED: "refused"}
+"""What is logged of the end of a job."""
+
+LOG = logger("studies")
 END = object()
 
 Work = Callable[[Any, Callable[[float], None]], Any]
@@ -110,11 +115,6 @@ def outcome(work: Work, job: Any, report: Callable[[float], None]) -> tuple[str,
         return REFUSED, error
     except Exception as error:
         return FAILURE, error
-
-
-def available_cores() -> int:
-    """Return the number of cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
 def silent(_fraction: float) -> None:
@@ -195,6 +195,7 @@ def processes(work: Work, jobs: Iterable[Any], workers: int, *, own_main: bool =
                         process.start()
                     theirs.close()
                     started[ours] = process
+                    LOG.debug("worker process %s started", process.pid)
                     idle.append(ours)
                 connection = idle.pop()
                 at_work[connection] = taken  # type: ignore[assignment]
@@ -257,8 +258,7 @@ class _Watch:
 
 def _serve(work: Work, connection: Connection) -> None:
     """Work on the jobs that come through a pipe until it is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    leave_interrupts_to_parent()
     sending = threading.Lock()
 
     def send(message: Any) -> None:
@@ -341,19 +341,6 @@ def one_thread() -> Iterator[None]:
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
-    """Let processes that start now be deaf to Ctrl-C, also while they import."""
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
-@contextmanager
 def _with_main(own: bool) -> Iterator[None]:
     """Unless its own is wanted, keep a new process from running the user's script again."""
     main = sys.modules["__main__"]
@@ -403,6 +390,7 @@ class _Run:
         self.jobs, self.done, self.tries = jobs, done, tries
         self.queue, self.elsewhere = deque(range(len(jobs))), deque[int]()
         self.results: dict[int, Any] = {}
+        self.begun: dict[int, float] = {}
         self.deaths: Counter[int] = Counter()
         self.refusals: Counter[int] = Counter()
 
@@ -410,6 +398,7 @@ class _Run:
         """Yield the jobs that wait, while there is time, and note their numbers in ``taken``."""
         while self.queue and time.monotonic() < end:
             taken.append(self.queue.popleft())
+            self.begun[taken[-1]] = time.monotonic()
             yield self.jobs[taken[-1]]
 
     def finish(self, k: int, value: Any) -> None:
@@ -420,6 +409,11 @@ class _Run:
 
     def note(self, k: int, kind: str, value: Any) -> None:
         """Take what a worker says of a job: its result, or why there is none; raise what ends the run."""
+        name = getattr(self.jobs[k], "name", self.jobs[k])
+        seconds = time.monotonic() - self.begun.pop(k, time.monotonic())
+        LOG.info(
+            "%s: %s after %.1f s%s", name, ENDS[kind], seconds, f" ({value})" if kind in (FAILURE, REFUSED) else ""
+        )
         if kind == FAILURE:
             raise value
         if kind == CLAIMED:

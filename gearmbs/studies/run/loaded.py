@@ -12,13 +12,13 @@ import bisect
 import dis
 import importlib.util
 import inspect
-import os
 import sys
-import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
+
+from gearmbs.system import began
 
 MESSAGES_FROM = ("warn", "warn_explicit")
 """Functions whose texts are read by people only."""
@@ -27,17 +27,7 @@ CLOCK_TICKS = 0.02
 """Seconds to which the beginning of a process is known; an interpreter takes longer until it imports anything."""
 
 
-def _began() -> float:
-    """Return when this process began, in seconds since 1970; where that is not known, now."""
-    try:
-        ticks = float(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
-        since_boot = float(Path("/proc/uptime").read_text().split()[0]) - ticks / os.sysconf("SC_CLK_TCK")
-        return time.clock_gettime(time.CLOCK_REALTIME) - since_boot
-    except (OSError, ValueError, IndexError):
-        return time.time()
-
-
-BEGAN = _began()
+BEGAN = began()
 """When this process began, or the one that it was forked from: what that had loaded, it has."""
 
 

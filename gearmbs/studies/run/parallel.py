@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import xarray as xr
 
@@ -16,9 +16,10 @@ from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
 from gearmbs.studies.run.accuracy import asked_accuracy, check_accurate
 from gearmbs.studies.run.claims import Claim, claimed
-from gearmbs.studies.run.engine import available_cores, processes, run_jobs, threads
+from gearmbs.studies.run.engine import processes, run_jobs, threads
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted, run_case
 from gearmbs.studies.run.store import RecordFolder, file_stem, record_size
+from gearmbs.system import cores
 from gearmbs.units import QuantityLike
 from gearmbs.wording import warn
 
@@ -37,8 +38,34 @@ def run_named(
     """Return what ``work(name, report)`` gives by name, in threads, with bars; as many at a time as there are cores."""
     with bars(progress, names) as move:
         done = None if move is None else lambda name, _result: move(name, 1.0)
-        results = run_jobs(work, names, workers or available_cores(), where=threads, progress=move, done=done)
+        results = run_jobs(work, names, workers or cores(), where=threads, progress=move, done=done)
     return dict(zip(names, results, strict=True))
+
+
+@overload
+def run_cases(
+    cases: Sequence[Case],
+    *,
+    workers: int | None = ...,
+    progress: bool | Callable[[str, float], None] | None = ...,
+    done: Callable[[Case, xr.Dataset], None] | None = ...,
+    folder: str | Path | None = ...,
+    errors: Literal["raise"] = ...,
+    accuracy: QuantityLike | None = ...,
+) -> list[xr.Dataset]: ...
+
+
+@overload
+def run_cases(
+    cases: Sequence[Case],
+    *,
+    workers: int | None = ...,
+    progress: bool | Callable[[str, float], None] | None = ...,
+    done: Callable[[Case, xr.Dataset], None] | None = ...,
+    folder: str | Path | None = ...,
+    errors: Literal["keep"],
+    accuracy: QuantityLike | None = ...,
+) -> list[xr.Dataset | SimulationFailed | CaseError]: ...
 
 
 def run_cases(
@@ -50,7 +77,7 @@ def run_cases(
     folder: str | Path | None = None,
     errors: Literal["raise", "keep"] = "raise",
     accuracy: QuantityLike | None = None,
-) -> list[Any]:
+) -> Sequence[xr.Dataset | SimulationFailed | CaseError]:
     """Run cases in parallel and return their records in order.
 
     Parameters
@@ -114,7 +141,7 @@ def run_cases(
         check_place(ledger.path, needed, f"the study of {len(cases) - len(found)} records")
         ledger.path.mkdir(parents=True, exist_ok=True)
     left = [case for case in cases if case.name not in found]
-    workers = max(1, min(workers or available_cores(), len(left)))
+    workers = max(1, min(workers or cores(), len(left)))
     if workers > 1:
         # the longest first, or the last one would keep the others waiting
         left.sort(key=_cost, reverse=True)

@@ -26,6 +26,7 @@ from gearmbs.wording import did_you_mean
 
 if TYPE_CHECKING:
     from gearmbs.signals.time_frequency import SweepWaterfallKeywords
+    from gearmbs.studies.case.keywords import SolverKeywords
     from gearmbs.units import QuantityLike
 
 
@@ -210,7 +211,10 @@ def cases_of_sweep(case: Case, field: str, values: Sequence[Any]) -> list[Case]:
         except CaseError as error:
             raise CaseError(f"value {place} of {field}: {str(error).partition(': ')[2] or error}") from None
         cases.append(one)
-    rates = {"signal_rate": max(c.signal_rate for c in cases), "output_rate": max(c.output_rate for c in cases)}
+    rates: SolverKeywords = {
+        "signal_rate": max(c.signal_rate for c in cases),
+        "output_rate": max(c.output_rate for c in cases),
+    }
     if case.solver.signal_rate is None and case.solver.output_rate is None:
         cases = [c.changed(solver=rates) for c in cases]
     cases = [c.changed(name=f"{case.name}, {name} {readable(getattr(c, section), name)}") for c in cases]
