@@ -172,7 +172,7 @@ def still_orders(signal: xr.DataArray, speed: float) -> list[int]:
     peaks = 1 + np.flatnonzero(inner)
     peaks = peaks[peaks * width > 0.5 * turn]
     peaks = peaks[np.argsort(level[peaks])[::-1][:MOST_LINES]]
-    still = np.array([at * width for at in peaks if _stands_still(values[:, int(np.argmax(best[at]))], at)])
+    still = np.array([at * width for at in peaks if _stands_still(values[:, int(np.argmax(best[at]))], int(at))])
     mains = [abs(f / m - round(f / m)) * m <= MAINS_SHARE * f + EDGE * width for f in still for m in MAINS]
     still = still[~np.array(mains, dtype=bool).reshape(-1, len(MAINS)).any(axis=1)]
     if still.size < FEWEST_STILL:
