@@ -104,23 +104,10 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
         Scratch.
     """
     functions = unbound(bound)
-    times, rows = times_from(st, 0), rows_from(st, 0)
     n = st.y.shape[0]
-    landed = t == times[0]
-    st.t = times[0] = t
-    copy(y, rows[0])
-    copy(y, st.y)
-    copy(yp, st.yp)
-    if not landed and st.n_past > 2 and times[0] - times[1] < CLOSE * (times[1] - times[2]):
-        for j in range(1, st.n_past - 1):
-            times[j] = times[j + 1]
-            copy(rows[j + 1], rows[j])
-        st.n_past -= 1
-    renew_weights(st, y, st.h)
+    landed = _cut(st, t, y, yp)
     terms = min(max(st.order, 1), TERMS)
-    # points further back serve no step to come
-    st.n_past = min(st.n_past, st.order + SPARE)
-    reach = t - times[min(st.order + 1, st.n_past - 1)]
+    reach = t - times_from(st, 0)[min(st.order + 1, st.n_past - 1)]
     moved = 0.0 if follows else np.inf
     if place >= 0 and not jumps and _foresees(st, place, abs(change), reach):
         follows = False
@@ -166,6 +153,34 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
         st.residuals += int(jumps) * (1 + int(leads)) + 2 * int(leads)
     if follows and leads and not jumps and place >= 0:
         st.turned, st.turn_moves, st.turn_reach, st.turns_trusted = place, moved / abs(change), reach, 0
+    _go_on(st, not landed or moved > DOUBTED)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cut(st, t, y, yp):
+    """Let the last step end at ``t``, with its values there; return whether it did so already.
+
+    A point that is left too near to the new end goes, and so do those further back than serve a step to come.
+    """
+    times, rows = times_from(st, 0), rows_from(st, 0)
+    landed = t == times[0]
+    st.t = times[0] = t
+    copy(y, rows[0])
+    copy(y, st.y)
+    copy(yp, st.yp)
+    if not landed and st.n_past > 2 and times[0] - times[1] < CLOSE * (times[1] - times[2]):
+        for j in range(1, st.n_past - 1):
+            times[j] = times[j + 1]
+            copy(rows[j + 1], rows[j])
+        st.n_past -= 1
+    renew_weights(st, y, st.h)
+    st.n_past = min(st.n_past, st.order + SPARE)
+    return landed
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _go_on(st, doubted):
+    """Begin behind a jump: ``doubted`` is whether a step that is refused there tells that the past is of no use."""
     copy(st.yp, st.yp_start)
     st.order = min(st.order, max(1, st.n_past - 1))
     st.restarts += 1
@@ -173,7 +188,7 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
     st.sign_pencil = 0.0
     st.asked = -np.inf
     st.jumps_in_turn += 1
-    st.passing = not landed or moved > DOUBTED
+    st.passing = doubted
     st.n_records = 0
     record_history(st, 0)
 
