@@ -32,9 +32,9 @@ dist: export NUMBA_CPU_NAME := x86-64-v3
 dist: export NUMBA_CPU_FEATURES :=
 dist: export NUMBA_CACHE_DIR := $(CURDIR)/$(OUT)/kernels
 dist: $(VENV)/.installed-dev $(VENV)/.installed-docs
-	rm -rf $(OUT)/kernels dist
+	rm -rf $(OUT)/kernels $(OUT)/executed dist
 	$(BIN)/python -m gearmbs.compile --quiet
-	$(BIN)/python -m sphinx -q -b html docs $(OUT)/pages
+	$(BIN)/python -m sphinx -q -b html -D nb_execution_cache_path=$(CURDIR)/$(OUT)/executed docs $(OUT)/pages
 	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	$(BIN)/python -m gearmbs.kernels.ship dist/gearmbs-*-none-any.whl --out dist --kernels $(OUT)/kernels
 

@@ -90,7 +90,7 @@ class Bearing(Described):
     bore, outside_diameter, width : float or str, optional
         Boundary dimensions, m.
     dynamic_rating, static_rating : float or str, optional
-        C and C_0 from a catalogue, N; default: by the formulas of ISO 281 and ISO 76, see `gearmbs.bearings.bearing`.
+        C and C_0 from a catalogue, N; default: by the formulas of ISO 281 and ISO 76, see `gearmbs.bearings.rating`.
     youngs_modulus, poisson_ratio, density
         Of elements and rings, Pa and kg/m^3.
     designation : str

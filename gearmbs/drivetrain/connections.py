@@ -33,9 +33,9 @@ def rolling_bearing(value: Any) -> Any:
         return bearings.Bearing.from_designation(value, estimate=True)
     if isinstance(value, Mapping):
         settings = dict(value)
-        designation = settings.pop("designation", None)
+        designation, estimate = settings.pop("designation", None), settings.pop("estimate", True)
         return (
-            bearings.Bearing.from_designation(designation, estimate=True, **settings)
+            bearings.Bearing.from_designation(designation, estimate=estimate, **settings)
             if designation
             else bearings.Bearing(**settings)
         )

@@ -284,7 +284,8 @@ def _housing(where: str, name: str, settings: dict[str, Any], folder: Path) -> H
         made = []
         for part, table in tables.items():
             fitted = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
-            made.append(_of_kind(f"{where}.{key}.{part}", kind, f"{name} {part}", fitted))
+            called = str(fitted.pop("name", f"{name} {part}"))
+            made.append(_of_kind(f"{where}.{key}.{part}", kind, called, fitted))
         settings[key] = tuple(made)
     return _of_kind(where, Housing, name, settings)
 

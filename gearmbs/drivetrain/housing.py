@@ -128,9 +128,13 @@ class Housing(Part):
     seats: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
     faces: str = "average"
     damping: Any = DAMPING
+    told: Any = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if isinstance(self.model, Mapping):
+            # for a file
+            object.__setattr__(self, "told", dict(self.model))
         if self.model is None:
             for name in ("mass", "inertia"):
                 require(getattr(self, name) is not None, f"{self.label}: {name} is missing; give it, or a model")

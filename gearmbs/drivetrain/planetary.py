@@ -230,6 +230,8 @@ def planetary_set(
         table["contact"] = contact_law(table["contact"], contact)
     if "friction" in table:
         table["friction"] = flank_friction(table["friction"])
+    if isinstance(table.get("planet_at_ring"), Mapping):
+        table["planet_at_ring"] = GearSpec(**{"name": "planet at ring", **table["planet_at_ring"]})
     places = []
     for one in table.pop("faults", ()):
         require(fault is not None, f"{place}: faults cannot be read here; run the file with gearmbs run")

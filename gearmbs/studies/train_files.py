@@ -1,19 +1,19 @@
 """A drivetrain as a TOML file, from which it is read again.
 
 Every part is a table of the fields that differ from their defaults, quantities with the units they were given in. What
-is written is read back before it counts: what would not come back as it is has no form in a file, and is refused with
-the name of its part.
+is written is read back before it counts, and compared number by number with what was to be written: what would not come
+back as it is has no form in a file, and is refused with the name of its part.
 """
 
 from __future__ import annotations
 
 import inspect
-import json
 import re
 import tomllib
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ import numpy as np
 from gearmbs._display import settings_of
 from gearmbs.bearings import Bearing, Defect
 from gearmbs.bearings.defects import as_defects
-from gearmbs.drivetrain import Drivetrain, DrivetrainError, Shaft
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, RollingContactBearing, Shaft
 from gearmbs.drivetrain.connections import rolling_bearing
 from gearmbs.drivetrain.description import Description, make_description
 from gearmbs.drivetrain.drivetrain import KINDS
@@ -31,7 +31,7 @@ from gearmbs.drivetrain.parts import GearMesh, Wheel, contact_law, flank_frictio
 from gearmbs.drivetrain.planetary import PlanetaryStage, planetary_set
 from gearmbs.files import write_whole
 from gearmbs.flexible import ShaftSection
-from gearmbs.gears import ContactLaw, FlankFriction, GearSpec, PlanetarySet
+from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material, PlanetarySet
 from gearmbs.gears.faults import Fault
 from gearmbs.mechanism.parts.functions import TimeFunction, expression
 from gearmbs.schema.described import toml_value
@@ -40,8 +40,6 @@ from gearmbs.units import Given
 
 HEAD = ("running", "gravity", "run_up")
 """Fields of a drivetrain that are no parts."""
-
-
 PLACED = ("angles", "carrier_radius", "pin_errors")
 """Fields of a planetary set that follow from the others where its planets are evenly spaced and in place."""
 FOLLOW = ("rim_thickness", "fillet_radius", "dedendum", "addendum")
@@ -59,34 +57,26 @@ def train_toml(thing: Drivetrain | Description) -> str:
     Raises
     ------
     DrivetrainError
-        If a part holds what no file can: a function of Python, a model in memory, a class; the message names the part.
+        If a part holds what no file can: a function of Python, a model in memory, a class of one's own; the message
+        names the part.
     """
-    train = thing.train if isinstance(thing, Description) else thing
-    tables = _tables(thing)
-    lines = [f"name = {toml_value(train.name)}"]
-    lines += [f"{key} = {_inline(tables[key])}" for key in HEAD if key in tables]
-    for group in KINDS:
-        for name, table in tables.get(group, {}).items():
-            lines += _lines(f"{group}.{_key(name)}", table)
-    lines += _lines("run", tables["run"]) if "run" in tables else []
-    text = "\n".join(lines) + "\n"
-    with warnings.catch_warnings():
-        # they were told when the drivetrain was made
-        warnings.simplefilter("ignore")
-        try:
-            again = _tables(make_description(tomllib.loads(text), train.name, tooth_fault))
-        except ValueError as error:
-            raise DrivetrainError(f"{train.name}: it has no form in a file that can be read: {error}") from None
-    for group in KINDS:
-        for name, table in tables.get(group, {}).items():
-            other = again.get(group, {}).get(name, {})
-            changed = sorted(key for key in {*table, *other} if table.get(key) != other.get(key))
-            if changed:
-                raise DrivetrainError(
-                    f"{train.parts[name].label}: {', '.join(changed)} would be read from a file as another; keep this "
-                    "drivetrain in Python"
-                )
-    return text
+    train, run = (thing.train, thing.run) if isinstance(thing, Description) else (thing, None)
+    told = _exact_tables(train, run)
+    # texts of quantities are kept where they are read as what they are; else the numbers in SI are written
+    numbers: set[tuple[str, str]] = set()
+    while True:
+        text = _text(train, run, numbers)
+        wrong = _differing(told, _exact_tables(*_read(train, text)))
+        if not wrong:
+            return text
+        if wrong <= numbers:
+            names = sorted({name for name, _ in wrong})
+            changed = ", ".join(sorted({key for name, key in wrong if name == names[0]}))
+            label = train.parts[names[0]].label if names[0] in train.parts else names[0]
+            raise DrivetrainError(
+                f"{label}: {changed} would be read from a file as another; keep this drivetrain in Python"
+            )
+        numbers |= wrong
 
 
 def write_train(thing: Drivetrain | Description, path: str | Path) -> Path:
@@ -94,76 +84,203 @@ def write_train(thing: Drivetrain | Description, path: str | Path) -> Path:
     return write_whole(path, train_toml(thing))
 
 
-# What a file holds, as nested tables of texts, numbers, truths and lists.
-
-
-def _tables(thing: Drivetrain | Description) -> dict[str, Any]:
-    """Return the nested tables that describe a drivetrain."""
-    train, run = (thing.train, thing.run) if isinstance(thing, Description) else (thing, None)
-    tables: dict[str, Any] = {key: _form(value, key) for key, value in settings_of(train) if key in HEAD}
+def _text(train: Drivetrain, run: Any, numbers: set[tuple[str, str]]) -> str:
+    """Return the text of a file; of some fields, by part and name, with numbers in SI for all quantities."""
+    lines = [f"name = {toml_value(train.name)}"]
+    for key, value in settings_of(train):
+        if key in HEAD:
+            lines.append(f"{key} = {_inline(_form(value, key, (train.name, key) not in numbers))}")
     for group in KINDS:
-        parts = {part.name: _part(part) for part in getattr(train, group)}
-        tables |= {group: parts} if parts else {}
-    own = {} if run is None else _fields(run, "run")
-    return tables | ({"run": own} if own else {})
+        for part in getattr(train, group):
+            own = {key for name, key in numbers if name == part.name}
+            lines += _lines(f"{group}.{_key(part.name)}", _part(part, own))
+    own = {} if run is None else _fields(run, "run", ("run", "run") not in numbers)
+    return "\n".join([*lines, *(_lines("run", own) if own else [])]) + "\n"
 
 
-def _part(part: Any) -> dict[str, Any]:
-    """Return the table of a part."""
-    table = {"kind": part.kind} if isinstance(getattr(part, "kind", None), str) else {}
-    for name, value in settings_of(part):
-        where = f"{part.label}: {name}"
-        if name == "name" or value is None or (isinstance(value, Mapping) and not value):
-            continue
-        if isinstance(part, Wheel) and name == "gear":
-            table |= _gear(value, where)
-        elif isinstance(part, GearMesh) and name == "settings":
-            table |= {key: _form(item, f"{part.label}: {key}") for key, item in value.items() if item is not None}
-        elif isinstance(part, PlanetaryStage) and name == "gears":
-            table |= _planetary(value, where)
-        elif isinstance(part, Housing) and name in ("mounts", "modes") and isinstance(value, (list, tuple)):
-            # their names begin with the housing's where a file has told them
-            table[name] = {one.name.removeprefix(f"{part.name} "): _part(one) for one in value}
-        elif not (isinstance(part, Shaft) and name == "length" and part.sections is not None):
-            # of sections the length is their sum
-            table[name] = _form(value, where)
-    return table
+def _read(train: Drivetrain, text: str) -> tuple[Drivetrain, Any]:
+    with warnings.catch_warnings():
+        # they were told when the drivetrain was made
+        warnings.simplefilter("ignore")
+        try:
+            read = make_description(tomllib.loads(text), train.name, tooth_fault)
+        except ValueError as error:
+            raise DrivetrainError(f"{train.name}: it has no form in a file that can be read: {error}") from None
+    return read.train, read.run
 
 
-def _form(value: Any, where: str) -> Any:
-    """Return a value as a file can hold it."""
-    if isinstance(value, Given):
-        return value.text
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, (bool, int, float, str)):
+# What two drivetrains are compared by: numbers in SI, texts, and objects by their classes and fields.
+
+
+def _exact_tables(train: Drivetrain, run: Any) -> dict[str, dict[str, Any]]:
+    """Return what a drivetrain is, by part and field."""
+    found = {name: _exact_part(part) for name, part in train.parts.items()}
+    found[train.name] = {key: _exact(getattr(train, key)) for key in HEAD}
+    return found | ({} if run is None else {"run": {"run": _exact(run)}})
+
+
+def _differing(one: dict[str, dict[str, Any]], two: dict[str, dict[str, Any]]) -> set[tuple[str, str]]:
+    """Return parts and fields of ``one`` that ``two`` has otherwise."""
+    return {
+        (name, key)
+        for name, table in one.items()
+        for key, value in table.items()
+        if two.get(name, {}).get(key) != value
+    }
+
+
+def _exact_part(part: Any) -> dict[str, Any]:
+    found = {item.name: _exact(getattr(part, item.name)) for item in fields(part) if item.init}
+    found["kind"] = type(part).__qualname__
+    if isinstance(part, GearMesh):
+        # laws, frictions and faults may be tables or objects
+        settings = {key: value for key, value in part.settings.items() if value is not None}
+        for key, read in (("contact", contact_law), ("friction", flank_friction)):
+            if key in settings:
+                settings[key] = read(settings[key])
+        if "faults" in settings:
+            settings["faults"] = [tooth_fault(one) for one in settings["faults"]]
+        found["settings"] = _exact(settings)
+        found["pair"] = None if part.pair is GearPair else _exact(part.pair)
+    elif isinstance(part, PlanetaryStage):
+        # springs, or what puts bearings between pins and planets, of which a function keeps all but their kind
+        found["pins"] = _pins(part, True)
+        found["on pins"] = _exact(getattr(part.on_pins, "rolling", None))
+        found["masses"] = _exact(part.weights)
+    elif isinstance(part, Housing) and part.told is not None:
+        found["model"] = _exact(part.told)
+    elif isinstance(part, RollingContactBearing) and "defects" in part.settings:
+        found["settings"] = _exact({**part.settings, "defects": as_defects(part.settings["defects"])})
+    return found
+
+
+def _exact(value: Any) -> Any:
+    """Return a value for comparison."""
+    if isinstance(value, (bool, str)) or value is None:
         return value
+    if isinstance(value, Real):
+        return float(value)
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, Mapping):
-        return {str(key): _form(item, f"{where}.{key}") for key, item in value.items() if item is not None}
+        return {str(key): _exact(item) for key, item in value.items() if item is not None}
     if isinstance(value, (list, tuple, np.ndarray)):
-        return [_form(item, f"{where}[{place}]") for place, item in enumerate(value)]
+        return [_exact(item) for item in value]
+    if isinstance(value, TimeFunction):
+        return value.text
+    if _is_pint(value):
+        return _told(value)
+    if not is_dataclass(value) or isinstance(value, type):
+        return value
+    own = {item.name: _exact(getattr(value, item.name)) for item in fields(value)}
+    if isinstance(value, (GearSpec, Material, PlanetarySet)):
+        # a file has the name of the table only
+        own.pop("name", None)
+    if isinstance(value, GearSpec) and value.helix_angle == 0.0:
+        own.pop("hand")
+    return {"": type(value).__qualname__, **own}
+
+
+# What a file holds, as nested tables of texts, numbers, truths and lists.
+
+
+def _part(part: Any, numbers: set[str]) -> dict[str, Any]:
+    """Return the table of a part, of which some fields have numbers in SI for their quantities."""
+    table = {"kind": part.kind} if isinstance(getattr(part, "kind", None), str) else {}
+    for name, value in settings_of(part):
+        where, texts = f"{part.label}: {name}", name not in numbers
+        if name == "name" or value is None or (isinstance(value, Mapping) and not value):
+            continue
+        if isinstance(part, Wheel) and name == "gear":
+            table |= _gear(value, where, texts)
+        elif isinstance(part, GearMesh) and name == "pair":
+            if value is not GearPair:
+                raise DrivetrainError(f"{where} is {value!r}, which no file can hold; keep this drivetrain in Python")
+        elif isinstance(part, GearMesh) and name == "settings":
+            for key, item in value.items():
+                if item is not None:
+                    table[key] = _form(item, f"{part.label}: {key}", texts)
+        elif isinstance(part, PlanetaryStage) and name == "gears":
+            table |= _planetary(value, where, texts)
+        elif isinstance(part, PlanetaryStage) and name == "pins":
+            table[name] = _pins(part, texts)
+        elif isinstance(part, Housing) and name == "model":
+            if part.told is None:
+                raise DrivetrainError(
+                    f"{where}: a model in memory has no form in a file; give the table of its program and files"
+                )
+            table[name] = _form(part.told, where, texts)
+        elif isinstance(part, Housing) and name in ("mounts", "modes") and isinstance(value, (list, tuple)):
+            table[name] = _within(part, value, texts)
+        elif not (isinstance(part, Shaft) and name == "length" and part.sections is not None):
+            # of sections the length is their sum
+            table[name] = _form(value, where, texts)
+    return table
+
+
+def _pins(stage: PlanetaryStage, texts: bool) -> Any:
+    """Return what is between the planets of a stage and their pins."""
+    if stage.pins is None:
+        return None
+    told = _form(stage.pins, f"{stage.label}: pins", texts)
+    return {"rolling": told} if isinstance(stage.pins, Bearing) and isinstance(told, dict) else told
+
+
+def _within(housing: Housing, parts: Any, texts: bool) -> dict[str, Any]:
+    """Return the tables of mounts or modes; names that begin with the housing's are told without it."""
+    found: dict[str, Any] = {}
+    for part in parts:
+        table = _part(part, set() if texts else {item.name for item in fields(part)})
+        short = part.name.removeprefix(f"{housing.name} ")
+        if short == part.name or short in found:
+            short, table = part.name, {"name": part.name, **table}
+        found[short] = table
+    return found
+
+
+def _form(value: Any, where: str, texts: bool = True) -> Any:
+    """Return a value as a file can hold it; ``texts`` is whether quantities stand as they were given."""
+    if isinstance(value, Given):
+        return value.text if texts else float(value)
+    if isinstance(value, (bool, str, int, float)) and not isinstance(value, np.generic):
+        return value
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, Real):
+        return int(value) if isinstance(value, np.integer) else float(value)
+    if isinstance(value, Path):
+        return str(value)
+    if _is_pint(value):
+        return _told(value)
+    if isinstance(value, Mapping):
+        return {str(key): _form(item, f"{where}.{key}", texts) for key, item in value.items() if item is not None}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_form(item, f"{where}[{place}]", texts) for place, item in enumerate(value)]
     for kind, (form, read) in FORMS.items():
         if isinstance(value, kind):
-            table = form(value, where)
-            _check(value, table, read, where)
-            return table
+            for given in dict.fromkeys((texts, False)):
+                table = form(value, where, given)
+                if _reads_as(value, table, read):
+                    return table
+            raise DrivetrainError(f"{where}: {value!r} has no form in a file; keep this drivetrain in Python")
     if is_dataclass(value) and not isinstance(value, type):
-        return _fields(value, where)
+        return _fields(value, where, texts)
     raise DrivetrainError(
         f"{where} is {value!r}, which no file can hold; give a number, a text or a table, or leave it"
     )
 
 
-def _fields(value: Any, where: str) -> dict[str, Any]:
-    return {key: _form(item, f"{where}.{key}") for key, item in settings_of(value) if item is not None}
+def _fields(value: Any, where: str, texts: bool = True) -> dict[str, Any]:
+    return {key: _form(item, f"{where}.{key}", texts) for key, item in settings_of(value) if item is not None}
 
 
-def _check(value: Any, table: Any, read: Callable[[Any], Any], where: str) -> None:
-    """Raise DrivetrainError unless an object is read from its table as it is."""
-    if not _reads_as(value, table, read):
-        raise DrivetrainError(f"{where}: {value!r} has no form in a file; keep this drivetrain in Python")
+def _is_pint(value: Any) -> bool:
+    return hasattr(value, "magnitude") and hasattr(value, "units")
+
+
+def _told(quantity: Any) -> str:
+    """Return a quantity of pint as a text."""
+    return f"{float(quantity.magnitude)!r} {quantity.units:~C}"
 
 
 def _reads_as(value: Any, table: Any, read: Callable[[Any], Any]) -> bool:
@@ -171,72 +288,86 @@ def _reads_as(value: Any, table: Any, read: Callable[[Any], Any]) -> bool:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            return bool(read(table) == value)
+            return bool(_exact(read(table)) == _exact(value))
         except (TypeError, ValueError):
             return False
 
 
-def _law(law: ContactLaw, where: str) -> dict[str, Any]:
+def _law(law: ContactLaw, where: str, texts: bool) -> dict[str, Any]:
     """Return the table of a contact law: the settings of what makes its kind."""
-    taken = inspect.signature(ContactLaw.makers()[law.kind]).parameters
-    return {"kind": law.kind} | {
-        name: _form(value, f"{where}.{name}") for name, value in vars(law).items() if name in taken and name != "kind"
-    }
+    # one maker calls the damping a factor
+    values = {**vars(law), "factor": law.damping}
+    taken = [name for name in inspect.signature(ContactLaw.makers()[law.kind]).parameters if name in values]
+    return {"kind": law.kind} | {name: _form(values[name], where, texts) for name in taken if name != "kind"}
 
 
-def _bearing(bearing: Bearing, where: str) -> Any:
-    """Return the designation of a bearing if that says all, with what it leaves open if not, else all its fields."""
-    table = _fields(bearing, where)
+def _bearing(bearing: Bearing, where: str, texts: bool) -> Any:
+    """Return the shortest of what a bearing is read from: its designation, with fields beside it, its fields."""
+    table = _fields(bearing, where, texts)
     designation = table.pop("designation", None)
     if designation is None:
         return table
-    whole = {"designation": designation, **table}
-    return next((given for given in (designation, whole) if _reads_as(bearing, given, rolling_bearing)), whole)
+    every = {item.name: getattr(bearing, item.name) for item in fields(bearing) if item.init}
+    every = {key: _form(value, where, texts) for key, value in every.items() if value is not None and value != ()}
+    forms: list[Any] = [designation]
+    for other in ({}, table, every):
+        for estimate in ({}, {"estimate": False}):
+            forms.append({**other, **estimate, "designation": designation})
+    return next((form for form in forms if _reads_as(bearing, form, rolling_bearing)), table)
 
 
-def _section(section: ShaftSection, where: str) -> dict[str, Any]:
-    """Return a piece of a shaft; of the shaft's own material, which has no form in a section."""
+def _section(section: ShaftSection, where: str, texts: bool) -> dict[str, Any]:
+    """Return a piece of a shaft; of the shaft's own material, for another one has no form in a section."""
     if section.material is not None:
         raise DrivetrainError(f"{where}: a section of another material than its shaft has no form in a file")
-    return {
-        "length": _form(section.length, where), "diameter": _form(section.outer, where),
-        "bore": _form(section.inner, where), "end_diameter": _form(section.outer_end, where),
-        "end_bore": _form(section.inner_end, where),
-    }  # fmt: skip
+    told = ("length", "diameter", "bore", "end_diameter", "end_bore")
+    values = (section.length, section.outer, section.inner, section.outer_end, section.inner_end)
+    return {name: _form(value, where, texts) for name, value in zip(told, values, strict=True)}
 
 
-def _fault(fault: Fault, where: str) -> dict[str, Any]:
-    return {key: _form(item, f"{where}.{key}") for key, item in fault_table(fault).items() if item is not None}
+def _read_section(table: Any) -> ShaftSection:
+    return ShaftSection(table["length"], table["diameter"], table["bore"], table["end_diameter"], table["end_bore"])
 
 
-FORMS: dict[type, tuple[Callable[[Any, str], Any], Callable[[Any], Any]]] = {
+def _fault(fault: Fault, where: str, texts: bool) -> dict[str, Any]:
+    return {key: _form(item, f"{where}.{key}", texts) for key, item in fault_table(fault).items() if item is not None}
+
+
+def _defect(defect: Defect, where: str, texts: bool) -> dict[str, Any]:
+    return {"kind": defect.label, **_fields(defect, where, texts)}
+
+
+def _function(function: TimeFunction, where: str, texts: bool) -> str:
+    return function.text
+
+
+FORMS: dict[type, tuple[Callable[[Any, str, bool], Any], Callable[[Any], Any]]] = {
     ContactLaw: (_law, contact_law),
-    Bearing: (_bearing, rolling_bearing),
-    Fault: (_fault, tooth_fault),
     FlankFriction: (_fields, flank_friction),
-    Defect: (lambda defect, where: {"kind": defect.label, **_fields(defect, where)}, lambda t: as_defects([t])[0]),
-    TimeFunction: (lambda function, where: function.text, expression),
-    ShaftSection: (
-        _section,
-        lambda t: ShaftSection(t["length"], t["diameter"], t["bore"], t["end_diameter"], t["end_bore"]),
-    ),
+    Bearing: (_bearing, rolling_bearing),
+    Defect: (_defect, lambda table: as_defects([table])[0]),
+    Fault: (_fault, tooth_fault),
+    TimeFunction: (_function, expression),
+    ShaftSection: (_section, _read_section),
 }
 """How objects are told in a file, and what makes them again."""
 
 
-def _gear(gear: GearSpec, where: str) -> dict[str, Any]:
+def _gear(gear: GearSpec, where: str, texts: bool) -> dict[str, Any]:
     """Return the fields of a wheel's teeth and body but those that follow from others; the table has the name."""
-    table = _fields(gear, where)
+    table = _fields(gear, where, texts)
     for key in ("name", "material"):
         table.pop(key, None)
     for key in FOLLOW:
         rest = {name: value for name, value in table.items() if name != key}
-        if key in table and GearSpec(**rest, material=gear.material, name=gear.name) == gear:
+        if key in table and _reads_as(gear, rest, lambda t: GearSpec(**t, material=gear.material)):
             table = rest
-    return table | _fields(gear.material, where)
+    material = _fields(gear.material, where, texts)
+    material.pop("name", None)
+    return table | material
 
 
-def _planetary(gears: PlanetarySet, where: str) -> dict[str, Any]:
+def _planetary(gears: PlanetarySet, where: str, texts: bool) -> dict[str, Any]:
     """Return a planetary set by the teeth of its wheels and what these have in common.
 
     Raises
@@ -244,36 +375,55 @@ def _planetary(gears: PlanetarySet, where: str) -> dict[str, Any]:
     DrivetrainError
         For a set of wheels that differ in more than teeth and profile shift.
     """
-    wheels = {member: _gear(getattr(gears, member), where) for member in ("sun", "planet", "ring")}
+    wheels = {member: _gear(getattr(gears, member), where, texts) for member in ("sun", "planet", "ring")}
     sun = wheels["sun"]
     table = {"teeth": [wheel["teeth"] for wheel in wheels.values()], "module": sun["module"], "planets": gears.planets}
     shifts = [wheel.get("profile_shift", 0.0) for wheel in wheels.values()]
     table |= {"profile_shifts": shifts} if any(shifts) else {}
-    of_set = ("helix_angle", "hand", "pressure_angle")
+    of_set = ("helix_angle", "pressure_angle", *(("hand",) if gears.sun.helix_angle else ()))
     table |= {key: sun[key] for key in of_set if key in sun}
-    table["face_width"] = _form(gears.sun.face_width, where)
-    apart = ("teeth", "module", "profile_shift", "internal", "name", "face_width", *of_set)
+    table["face_width"] = _form(gears.sun.face_width, where, texts)
+    apart = ("teeth", "module", "profile_shift", "internal", "face_width", "hand", *of_set)
     others = {key: value for key, value in sun.items() if key not in apart}
     table |= {"wheels": others} if others else {}
     for key, value in settings_of(gears):
         if key in ("sun", "planet", "ring", "planets", "name") or value is None:
             continue
-        if key == "pin_errors":
-            table[key] = {str(int(k) + 1): _form(pair, f"{where}.{key}") for k, pair in value.items()}
+        if key == "planet_at_ring":
+            table[key] = _gear(value, where, texts)
+        elif key == "pin_errors":
+            table[key] = {str(int(k) + 1): _form(pair, f"{where}.{key}", texts) for k, pair in value.items()}
         elif key == "faults":
-            table[key] = [{"at": at, **_fault(fault, f"{where}.{key}")} for at, fault in value]
+            table[key] = [{"at": at, **_fault(fault, f"{where}.{key}", texts)} for at, fault in value]
         else:
-            table[key] = _form(value, f"{where}.{key}")
+            table[key] = _form(value, f"{where}.{key}", texts)
 
-    def read(table: dict[str, Any]) -> PlanetarySet:
-        return planetary_set({**table, "name": gears.name}, tooth_fault)
+    def read(table: Any) -> PlanetarySet:
+        return planetary_set(table, tooth_fault)
 
-    _check(gears, table, read, where)
+    _check_set(gears, table, read, where)
     for key in PLACED:
         rest = {name: value for name, value in table.items() if name != key}
         if key in table and _reads_as(gears, rest, read):
             table = rest
     return table
+
+
+def _check_set(gears: PlanetarySet, table: Any, read: Callable[[Any], PlanetarySet], where: str) -> None:
+    """Raise DrivetrainError, with the fields that no file can hold, unless a set is read from its table as it is."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            found = _exact(read(table))
+        except (TypeError, ValueError) as error:
+            raise DrivetrainError(f"{where} has no form in a file: {error}") from None
+    told = _exact(gears)
+    wrong = sorted(key for key in told if told[key] != found[key])
+    if wrong:
+        raise DrivetrainError(
+            f"{where}: {', '.join(wrong)} has no form in a file, where sun, planets and ring have all in common but "
+            "teeth and profile shifts; keep this drivetrain in Python"
+        )
 
 
 # Its text.
@@ -282,9 +432,15 @@ def _planetary(gears: PlanetarySet, where: str) -> dict[str, Any]:
 def _lines(header: str, table: Mapping[str, Any]) -> list[str]:
     """Return the lines of a table: its own values, then the tables in it."""
     inner = {
-        k: v for k, v in table.items() if isinstance(v, dict) and v and all(isinstance(i, dict) for i in v.values())
+        key: value
+        for key, value in table.items()
+        if isinstance(value, dict) and value and all(isinstance(item, dict) for item in value.values())
     }
-    listed = {k: v for k, v in table.items() if isinstance(v, list) and v and all(isinstance(i, dict) for i in v)}
+    listed = {
+        key: value
+        for key, value in table.items()
+        if isinstance(value, list) and value and all(isinstance(item, dict) for item in value)
+    }
     lines = ["", f"[{header}]"]
     lines += [f"{_key(k)} = {_inline(v)}" for k, v in table.items() if k not in inner and k not in listed]
     for key, tables in inner.items():
@@ -306,4 +462,4 @@ def _inline(value: Any) -> str:
 
 
 def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_value(name)

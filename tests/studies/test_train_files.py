@@ -7,6 +7,7 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
+import pint
 import pytest
 
 import gearmbs as gm
@@ -34,13 +35,14 @@ from gearmbs.drivetrain import (
     Wheel,
 )
 from gearmbs.drivetrain.description import Description, make_description, read_description
-from gearmbs.gears import ContactLaw, FlankFriction, GearSpec, IdealMesh, Material, planetary
+from gearmbs.gears import ContactLaw, FlankFriction, GearSpec, IdealMesh, Material, PlanetarySet, planetary
 from gearmbs.gears.faults import BrokenTooth
 from gearmbs.mechanism import expression
 from gearmbs.studies import load_train, run_train
 from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER
 from gearmbs.studies.train_files import train_toml
+from gearmbs.units import to_si
 from tests.says import says
 
 HELICAL = {"helix_angle": "12 deg", "face_width": "25 mm"}
@@ -183,6 +185,7 @@ def test_quantities_keep_their_units_and_what_follows_is_left_out():
     assert "angles" not in tables["planetary_stages"]["low stage"]
 
 
+@pytest.mark.slow
 def test_expressions_of_time_are_texts():
     varying = TorqueLoad(name="air", shaft="fan", torque=expression("30*(1+0.1*SIN(20*TIME))"))
     read = again(box(loads=[varying])).train.part("air")
@@ -226,3 +229,104 @@ def test_planets_of_another_make_than_the_sun_are_refused_and_of_the_same_are_wr
 def test_torque_drives_that_depend_on_time_come_back():
     drive = TorqueDrive(name="motor", shaft="in", speed="1500 rpm", torque="20 N m")
     assert again(box(drives=[drive])).train.part("motor") == drive
+
+
+@pytest.mark.parametrize("names", [("foot", "box foot"), ("foot",), ("box foot", "foot", "box box foot")])
+def test_mounts_and_modes_keep_their_names(names):
+    at = [(0.1 * k, -0.2, 0.0) for k in range(len(names))]
+    mounts = tuple(Mount(name=n, at=a, stiffness=(5e7, 5e7, 5e7)) for n, a in zip(names, at))
+    modes = tuple(
+        HousingMode(name=f"{n} mode", mass=8.0, stiffness=4e7 + k, shape={"a": [0.0, 0.6, 0.8]})
+        for k, n in enumerate(names)
+    )
+    housing = replace(box().part("box"), mounts=mounts, modes=modes)
+    assert again(box(housings=[housing])).train.part("box") == housing
+
+
+class Propeller(Fan):
+    """A load of one's own, of which a file knows nothing."""
+
+
+def test_classes_of_ones_own_are_refused():
+    load = Propeller(name="air", shaft="fan", torque="200 N m", at_speed="30 rad/s")
+    with pytest.raises(DrivetrainError, match=says("air", "kind", "Python")):
+        train_toml(box(loads=[load]))
+
+
+def test_texts_that_a_field_would_read_otherwise_become_numbers():
+    """25 Hz are 25 as a frequency, and 157 rad/s as a speed."""
+    drive = SpeedDrive(name="motor", shaft="in", speed=to_si("25 Hz", "frequency"))
+    text = train_toml(box(drives=[drive]))
+    assert "speed = 25.0" in text
+    assert make_description(tomllib.loads(text), "again", tooth_fault).train.part("motor").speed == 25.0
+
+
+@pytest.mark.parametrize(
+    "law", [ContactLaw.hunt_crossley(factor="1 s/m"), ContactLaw.impact("3e5 N/mm^1.3", damping="2 N*s/mm")]
+)
+def test_laws_of_contact_come_back(law):
+    mesh = GearMesh(name="stage 1", driver="z1", driven="z2", settings={"contact": law})
+    read = again(box(meshes=[mesh])).train
+    assert read.pairs["stage 1"].contact == law
+
+
+def test_quantities_of_pint_become_texts():
+    mesh = GearMesh(name="stage 1", driver="z1", driven="z2", settings={"backlash": pint.Quantity(0.1, "mm")})
+    train = box(meshes=[mesh])
+    assert again(train).train.pairs["stage 1"].backlash == train.pairs["stage 1"].backlash == pytest.approx(1e-4)
+
+
+@pytest.mark.parametrize(
+    "bearing",
+    [
+        Bearing.from_designation("6206"),
+        Bearing.from_designation("6206/C3", clearance=0.0),
+        Bearing(elements=9, element_diameter="9.5 mm", pitch_diameter="46 mm", designation="my 6206"),
+    ],
+)
+def test_bearings_come_back_by_designation_or_fields(bearing):
+    train = box(bearings=[RollingContactBearing(name="a", shaft="in", rolling=bearing), *box().bearings[1:]])
+    assert again(train).train.part("a").rolling == bearing
+
+
+SUN, PLANET, RING = (GearSpec(z, "2 mm", internal=z == 84, name=n) for z, n in ((24, "s"), (30, "p"), (84, "r")))
+
+
+@pytest.mark.parametrize(
+    "gears",
+    [
+        PlanetarySet(SUN, PLANET, RING, 3),
+        PlanetarySet(SUN, PLANET, GearSpec(78, "2 mm", internal=True), 3, planet_at_ring=GearSpec(24, "2 mm")),
+        planetary((24, 30, 84), "2 mm", 3, helix_angle="10 deg", hand="left", ideal=[3e8, 4e8]),
+    ],
+)
+@pytest.mark.parametrize("pins", [None, {"radial": "5e8 N/m"}, "HK2020"])
+@pytest.mark.slow
+def test_planetary_stages_come_back(gears, pins):
+    stage = replace(box().part("low stage"), gears=gears, pins=pins)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        train = box(planetary_stages=[stage])
+        read = again(train).train.part("low stage")
+    assert [g.teeth for g in (read.gears.sun, read.gears.planet, read.gears.ring)] == [
+        g.teeth for g in (gears.sun, gears.planet, gears.ring)
+    ]
+    assert read.gears.pairs_sun == replace(gears, name="low stage").pairs_sun or not gears.sun.helix_angle
+    assert read.weights == stage.weights
+    assert train_toml(replace(train, planetary_stages=(read,))) == train_toml(train)
+
+
+def test_a_wheel_that_needs_its_addendum_is_written():
+    gear = GearSpec(
+        21, "3 mm", profile_shift=0.9, addendum="4 mm", hand="left", material=Material(name="bronze"), **HELICAL
+    )
+    wheel = replace(box().part("z1"), gear=gear)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        train = box(wheels=[wheel, box().part("z2")])
+    assert again(train).train.part("z1").gear.addendum == gear.addendum
+
+
+def test_odd_names_are_escaped():
+    sensor = replace(box().part("on the box"), name='a "b"\x7f.c\nd')
+    assert again(box(sensors=[sensor])).train.part(sensor.name) == sensor
