@@ -259,7 +259,7 @@ def read_toml(path: str | Path, error: type[ValueError] = ValueError) -> dict[st
         What is raised if it cannot be read, is no text or no TOML, with the path in front.
     """
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+        return toml_tables(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as caught:
         raise error(f"{path}: cannot be read ({caught.strerror or caught})") from None
     except UnicodeDecodeError:
@@ -268,6 +268,11 @@ def read_toml(path: str | Path, error: type[ValueError] = ValueError) -> dict[st
         ) from None
     except tomllib.TOMLDecodeError as caught:
         raise error(f"{path}: not a valid TOML file ({caught}){of_adams(path)}") from None
+
+
+def toml_tables(text: str) -> dict[str, Any]:
+    """Return the tables of a text in TOML."""
+    return tomllib.loads(text)
 
 
 def toml_value(value: Any) -> str:

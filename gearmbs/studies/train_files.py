@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import inspect
 import re
-import tomllib
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
@@ -34,7 +33,7 @@ from gearmbs.flexible import ShaftSection
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec, Material, PlanetarySet
 from gearmbs.gears.faults import Fault
 from gearmbs.mechanism.parts.functions import TimeFunction, expression
-from gearmbs.schema.described import toml_value
+from gearmbs.schema.described import toml_tables, toml_value
 from gearmbs.studies.case.tooth_faults import fault_table, tooth_fault
 from gearmbs.units import Given
 
@@ -92,8 +91,8 @@ def _text(train: Drivetrain, run: Any, numbers: set[tuple[str, str]]) -> str:
             lines.append(f"{key} = {_inline(_form(value, key, (train.name, key) not in numbers))}")
     for group in KINDS:
         for part in getattr(train, group):
-            own = {key for name, key in numbers if name == part.name}
-            lines += _lines(f"{group}.{_key(part.name)}", _part(part, own))
+            plain = {key for name, key in numbers if name == part.name}
+            lines += _lines(f"{group}.{_key(part.name)}", _part(part, plain))
     own = {} if run is None else _fields(run, "run", ("run", "run") not in numbers)
     return "\n".join([*lines, *(_lines("run", own) if own else [])]) + "\n"
 
@@ -103,7 +102,7 @@ def _read(train: Drivetrain, text: str) -> tuple[Drivetrain, Any]:
         # they were told when the drivetrain was made
         warnings.simplefilter("ignore")
         try:
-            read = make_description(tomllib.loads(text), train.name, tooth_fault)
+            read = make_description(toml_tables(text), train.name, tooth_fault)
         except ValueError as error:
             raise DrivetrainError(f"{train.name}: it has no form in a file that can be read: {error}") from None
     return read.train, read.run
@@ -229,10 +228,12 @@ def _pins(stage: PlanetaryStage, texts: bool) -> Any:
 def _within(housing: Housing, parts: Any, texts: bool) -> dict[str, Any]:
     """Return the tables of mounts or modes; names that begin with the housing's are told without it."""
     found: dict[str, Any] = {}
+    names = {part.name for part in parts}
     for part in parts:
         table = _part(part, set() if texts else {item.name for item in fields(part)})
         short = part.name.removeprefix(f"{housing.name} ")
-        if short == part.name or short in found:
+        if short in names:
+            # as where nothing was taken away
             short, table = part.name, {"name": part.name, **table}
         found[short] = table
     return found
