@@ -71,7 +71,7 @@ def train_toml(thing: Drivetrain | Description) -> str:
         if wrong <= numbers:
             names = sorted({name for name, _ in wrong})
             changed = ", ".join(sorted({key for name, key in wrong if name == names[0]}))
-            label = train.parts[names[0]].label if names[0] in train.parts else names[0]
+            label = train.parts[names[0]].label if names[0] else train.name
             raise DrivetrainError(
                 f"{label}: {changed} would be read from a file as another; keep this drivetrain in Python"
             )
@@ -88,12 +88,12 @@ def _text(train: Drivetrain, run: Any, numbers: set[tuple[str, str]]) -> str:
     lines = [f"name = {toml_value(train.name)}"]
     for key, value in settings_of(train):
         if key in HEAD:
-            lines.append(f"{key} = {_inline(_form(value, key, (train.name, key) not in numbers))}")
+            lines.append(f"{key} = {_inline(_form(value, key, ('', key) not in numbers))}")
     for group in KINDS:
         for part in getattr(train, group):
             plain = {key for name, key in numbers if name == part.name}
             lines += _lines(f"{group}.{_key(part.name)}", _part(part, plain))
-    own = {} if run is None else _fields(run, "run", ("run", "run") not in numbers)
+    own = {} if run is None else _fields(run, "run", ("", "run") not in numbers)
     return "\n".join([*lines, *(_lines("run", own) if own else [])]) + "\n"
 
 
@@ -114,8 +114,11 @@ def _read(train: Drivetrain, text: str) -> tuple[Drivetrain, Any]:
 def _exact_tables(train: Drivetrain, run: Any) -> dict[str, dict[str, Any]]:
     """Return what a drivetrain is, by part and field."""
     found = {name: _exact_part(part) for name, part in train.parts.items()}
-    found[train.name] = {key: _exact(getattr(train, key)) for key in HEAD}
-    return found | ({} if run is None else {"run": {"run": _exact(run)}})
+    # no part is without a name
+    found[""] = {key: _exact(getattr(train, key)) for key in HEAD}
+    if run is not None:
+        found[""]["run"] = _exact(run)
+    return found
 
 
 def _differing(one: dict[str, dict[str, Any]], two: dict[str, dict[str, Any]]) -> set[tuple[str, str]]:

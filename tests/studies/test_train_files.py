@@ -330,3 +330,11 @@ def test_a_wheel_that_needs_its_addendum_is_written():
 def test_odd_names_are_escaped():
     sensor = replace(box().part("on the box"), name='a "b"\x7f.c\nd')
     assert again(box(sensors=[sensor])).train.part(sensor.name) == sensor
+
+
+def test_a_part_may_be_called_as_its_drivetrain():
+    train = replace(box(), name="box", running=True, gravity=(0.0, -9.81, 0.0))
+    read = again(Description(train, RunSettings(rate="20 kHz")))
+    assert (read.train.name, read.train.running, read.train.gravity) == ("box", True, (0.0, -9.81, 0.0))
+    assert read.run.rate == 20e3
+    assert read.train.part("box").mounts == train.part("box").mounts
