@@ -579,3 +579,34 @@ def test_points_before_a_state_without_history_are_kept_where_something_is_set_t
     speeds = [3.0, 3.0, 3.0, 1.0 if name == "speed" else 3.0]
     np.testing.assert_allclose(found.angular_velocity("two")[:, 2], 2.0 * np.array(speeds), atol=1e-6)
     np.testing.assert_array_equal(found.input("speed"), speeds)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("torque", ["u*u", "u*SIN(7*TIME)", "u*ABS(u)"])
+def test_lines_whose_effect_is_not_in_proportion_are_followed_to_the_tolerance(torque):
+    """What a turn of them would have done to the past is not known; runs that begin afresh at each turn do not ask."""
+
+    def speeds(tol, afresh=False):
+        m = gm.Mechanism("two discs")
+        markers = []
+        for name, inertia in (("a", 2.0), ("b", 1.0)):
+            body = m.body(name, mass=1.0, inertia=(inertia,) * 3)
+            m.revolute(f"pin {name}", body, m.ground, axis=(0, 0, 1))
+            markers.append(body.marker(name=f"on {name}"))
+        m.torsion_spring("shaft", *markers, stiffness=400.0, damping=0.8)
+        m.input("u", "N m")
+        m.torque("drive", m.bodies["a"], torque)
+        simulator, rng, found = gm.Simulator(m, 0.2, tol=tol), np.random.default_rng(1), []
+        for t in np.arange(1, 41) * 3e-3:
+            if afresh and simulator.t:
+                simulator.restore(simulator.state().without_history())
+            simulator.set("u", 10.0 * rng.standard_normal(), hold=1)
+            simulator.advance(t)
+            found.append(simulator.get("angular_velocity", "a")[2])
+        return np.array(found)
+
+    exact = speeds(1e-11, afresh=True)
+    for tol in (1e-7, 1e-9):
+        errors = [np.abs(speeds(tol, afresh) - exact).max() for afresh in (False, True)]
+        assert errors[0] < 30.0 * errors[1]
+        assert errors[0] < 300.0 * tol * max(1.0, np.abs(exact).max())

@@ -10,6 +10,7 @@ import numpy as np
 
 from gearmbs.dae.integrators.stepping.jumps import CHANGED, LED, ON_LINE
 from gearmbs.dae.problem import INPUT, ModelError, Number, cells_of
+from gearmbs.mechanism.parts.inputs import COEFFICIENTS
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.wording import did_you_mean
 
@@ -24,6 +25,8 @@ class Change(NamedTuple):
     leads: bool
     """Whether rates jump."""
     prescribes: bool
+    unsure: bool = False
+    """Whether a rate jumps whose effect is not in proportion to it, or changes with the time."""
 
 
 class Settings:
@@ -54,6 +57,9 @@ class Settings:
         coefficients, and the number of these.
     plain : dict of str to (int, int)
         The first of their places among all of ``places``, and how many there are.
+    bent : set of str
+        Inputs that stand in expressions or elements, which may take them to a power or by a factor of the time: what
+        a turn of their line would have done to the past is not known.
     """
 
     def __init__(self, numbers: Mapping[str, Number], aliases: Mapping[str, str], parts: Mapping[str, Any]) -> None:
@@ -72,6 +78,7 @@ class Settings:
             name: (end - len(places), len(places))
             for (name, places), end in zip(self.places.items(), ends, strict=True)
         }
+        self.bent = {name for name in self._inputs if any(p.size != COEFFICIENTS for p in numbers[name].places[1:])}
         self.waiting: dict[str, tuple[float, int]] = {}
         self.given: set[str] = set()
         self.led: dict[str, float] = {}
@@ -163,7 +170,7 @@ class Settings:
             return None
         ((name, (value, hold)),) = waiting.items()
         places = self.plain.get(name)
-        if places is None or (led and (len(led) > 1 or name not in led)):
+        if places is None or (led and (len(led) > 1 or name not in led)) or (name in self.bent and (hold or led)):
             return None
         return name, value, hold, *places
 
@@ -180,7 +187,7 @@ class Settings:
     def take(self, t: float, end: float) -> Change | None:
         """Return what changes at ``t``, None for nothing; lines that begin there end at ``end``."""
         waiting, before, after = self.waiting, self.held, self.held.copy()
-        loads, jumps, leads, prescribes = True, False, False, False
+        loads, jumps, leads, prescribes, unsure = True, False, False, False, False
         ended = [name for name, last in self.led.items() if last <= t and name not in waiting] if self.led else ()
         for name in (*waiting, *ended):
             own = self._own[name]
@@ -195,7 +202,7 @@ class Settings:
                 own.write(after, t, now if hold else value, slope)
                 loads &= own.kind == INPUT or own.loads
                 prescribes |= bool(own.prescribes)
-                jumps, leads = jumps or jumped, leads or turned
+                jumps, leads, unsure = jumps or jumped, leads or turned, unsure or (turned and name in self.bent)
             self.led.pop(name, None)
             if slope:
                 self.led[name] = end
@@ -203,4 +210,4 @@ class Settings:
         if not (jumps or leads):
             return None
         self.held = after
-        return Change(self.held, loads, jumps, leads, prescribes)
+        return Change(self.held, loads, jumps, leads, prescribes, unsure)

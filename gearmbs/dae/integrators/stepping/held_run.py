@@ -357,13 +357,14 @@ class HeldRun(Run):
             The time, and where the values there stand.
         cells : ndarray
             Places in the table of numbers.
-        change : (ndarray, bool, bool, bool, ...)
+        change : (ndarray, bool, bool, bool, bool, bool)
             What is to stand there; whether that only acts as loads do, which leave the matrix as it is; whether
-            equations change at the time, and whether the change grows with the time.
+            equations change at the time, and whether the change grows with the time; whether it prescribes a motion,
+            which is nothing here; and whether it is not known what it would have done to the past.
         """
         st, kept = self.state, True
         t, rows, row, *_ = point
-        values, loads, jumps, leads, *_ = change
+        values, loads, jumps, leads, _, unsure = change
         y, yp = rows.y[row], rows.yp[row]
         if self.last_records.changed_at == st.steps or (self._given is not None and self._given[0] == st.steps):
             last = self.last_step()
@@ -389,7 +390,7 @@ class HeldRun(Run):
             values,
             jumps,
             leads,
-            kept,
+            kept and not unsure,
             -1,
             0.0,
             self._scratch,
