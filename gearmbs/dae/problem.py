@@ -47,6 +47,8 @@ class Place:
     factor: float = 1.0
     table: int = -1
     offset: float = 0.0
+    bent: bool = False
+    """Whether what stands there may act otherwise than in proportion to the number, or by a factor of the time."""
 
     def polynomial(self, table: Table, t: float) -> tuple[float, ...]:
         """Return the value at a time and all derivatives."""

@@ -25,7 +25,7 @@ from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Load, State
 from gearmbs.mechanism.parts.functions import TimeFunction
-from gearmbs.mechanism.parts.inputs import COEFFICIENTS, Input, Parameter, unit_factor
+from gearmbs.mechanism.parts.inputs import COEFFICIENTS, Input, Parameter, is_multiple, unit_factor
 from gearmbs.mechanism.parts.modal import ModalBody
 
 if TYPE_CHECKING:
@@ -227,7 +227,8 @@ class _Compiler:
         number = self.builder.add_tape(tape)
         for name, place, size in tape.numbers:
             at = self.builder.tape_rows[-1][T.TAPE_R] + place
-            self.builder.add_place(name, Place(at, size, table=T.H_R_EXTRA), row)
+            bent = not is_multiple(tape.text, name)
+            self.builder.add_place(name, Place(at, size, table=T.H_R_EXTRA, bent=bent), row)
         at, n = self.builder.tape_rows[-1][T.TAPE_REFERENCE], tape.n_angles
         for k, start in enumerate(starting_angles(tape, self.mechanism.turns, self.marker_named)):
             # the reference, and the value of the last point that was tracked

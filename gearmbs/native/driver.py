@@ -56,8 +56,9 @@ class Driver(Struct):
         Place among the cells, and how many coefficients stand behind a time there, 0 for the number alone.
     per_unit, offset : ndarray
         What stands there for a unit of the number, and for none of it.
-    plain : ndarray of int64, shape (places, 2)
-        ``place`` and ``coefficients`` once more, as `gearmbs.dae.integrators.stepping.jumps.steer` takes them.
+    plain : ndarray of int64, shape (places, 3)
+        ``place`` and ``coefficients`` once more, and whether it is bent, as
+        `gearmbs.dae.integrators.stepping.jumps.steer` takes them.
     waiting, wanted : ndarray of int64 and of float64, shape (numbers,)
         Whether a number has been set that has not taken effect, and to what.
     scratch : ndarray, shape (TERMS + 3, n)

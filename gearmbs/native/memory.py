@@ -305,7 +305,7 @@ def _driver(begun: Begun, numbers: Mapping[str, Number], deforms: bool) -> Drive
         coefficients=np.array([place.size for place in places], dtype=np.int64),
         per_unit=np.array([place.factor for place in places], dtype=float),
         offset=np.array([place.offset for place in places], dtype=float),
-        plain=np.array([(place.at, place.size) for place in places], dtype=np.int64).ravel(),
+        plain=np.array([(place.at, place.size, place.bent) for place in places], dtype=np.int64).ravel(),
         waiting=np.zeros(len(own), dtype=np.int64),
         wanted=np.zeros(len(own)),
         scratch=np.zeros((TERMS + 3, n)),

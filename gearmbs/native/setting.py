@@ -114,7 +114,7 @@ def apply(bound, st, plan, factors, d, shows):
     kept, done, steered = _keeps_coordinates(st, d), False, False
     if count == 1 and kept and st.steps > 0 and _is_plain(d, only):
         first, size = d.first[only], d.first[only + 1] - d.first[only]
-        places = matrix_at(d.plain, 2 * first, size, 2)
+        places = matrix_at(d.plain, 3 * first, size, 3)
         code = steer_at(d.steer)(
             bound, st, plan, factors, d.t, y, yp, places, d.wanted[only], d.t, d.cells, d.values, d.scratch
         )

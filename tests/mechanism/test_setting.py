@@ -582,7 +582,7 @@ def test_points_before_a_state_without_history_are_kept_where_something_is_set_t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("torque", ["u*u", "u*SIN(7*TIME)", "u*ABS(u)"])
+@pytest.mark.parametrize("torque", ["u*u", "u*SIN(7*TIME)", "IF(u-5: 0, 0, 100*(u-5)**2)", "2*u"])
 def test_lines_whose_effect_is_not_in_proportion_are_followed_to_the_tolerance(torque):
     """What a turn of them would have done to the past is not known; runs that begin afresh at each turn do not ask."""
 

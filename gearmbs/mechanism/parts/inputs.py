@@ -152,6 +152,23 @@ class Output:
         return f"Output({self.name!r}, {'a sensor' if callable(self.what) else repr(self.what)})"
 
 
+_FACTOR = r"\d*\.?\d+(?:[eE][-+]?\d+)?"
+
+
+def is_multiple(text: str, name: str) -> bool:
+    """Return whether an expression is plainly a constant times a number of the model, "2*load" or "-load".
+
+    Of other forms nothing is said: they may be multiples, too.
+
+    Examples
+    --------
+    >>> is_multiple("-0.5 * load", "load"), is_multiple("load*load", "load")
+    (True, False)
+    """
+    form = rf"\(*[-+]?(?:{_FACTOR}\*)?{re.escape(name)}(?:[*/]{_FACTOR})?\)*"
+    return re.fullmatch(form, text.replace(" ", ""), re.IGNORECASE) is not None
+
+
 def make_output(name: str, what: Any) -> Output:
     """Return an output.
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from gearmbs.dae.integrators.stepping.jumps import CHANGED, LED, ON_LINE
 from gearmbs.dae.problem import INPUT, ModelError, Number, cells_of
-from gearmbs.mechanism.parts.inputs import COEFFICIENTS
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.wording import did_you_mean
 
@@ -53,8 +52,7 @@ class Settings:
     given : set of str
         What has been set since it was last looked at, though to the value that it had.
     places : dict of str to ndarray of int
-        Inputs that stand nowhere as integrals, and all their places among the cells: of the time before the
-        coefficients, and the number of these.
+        Inputs that stand nowhere as integrals, and all their places among the cells, see `jumps.steer`.
     plain : dict of str to (int, int)
         The first of their places among all of ``places``, and how many there are.
     bent : set of str
@@ -69,7 +67,7 @@ class Settings:
         self._own = {name: number.moved_to(self.cells) for name, number in numbers.items()}
         self._inputs = [name for name, number in numbers.items() if number.kind == INPUT]
         self.places = {
-            name: np.array([(place.at, place.size) for place in self._own[name].places])
+            name: np.array([(place.at, place.size, place.bent) for place in self._own[name].places], dtype=np.int64)
             for name in self._inputs
             if not numbers[name].prescribes and all(p.size and p.order == 0 for p in numbers[name].places)
         }
@@ -78,7 +76,7 @@ class Settings:
             name: (end - len(places), len(places))
             for (name, places), end in zip(self.places.items(), ends, strict=True)
         }
-        self.bent = {name for name in self._inputs if any(p.size != COEFFICIENTS for p in numbers[name].places[1:])}
+        self.bent = {name for name in self._inputs if any(p.bent for p in numbers[name].places)}
         self.waiting: dict[str, tuple[float, int]] = {}
         self.given: set[str] = set()
         self.led: dict[str, float] = {}

@@ -519,7 +519,7 @@ class Simulator(Sampled, Restored, Guessed):
             return
         # where the simulation starts nothing has been before
         before = run.event_values(own["_point"]) if own["_stops"] and own["t"] > own["_t_start"] else None
-        if change.prescribes or not run.state.steps:
+        if change.prescribes or change.unsure or not run.state.steps:
             self._start_with(change.values)
         else:
             began = perf_counter()

@@ -58,9 +58,6 @@ TRUSTED = 16
 """Turns of a line that are foretold to be unseen, by half as much, before one is looked at again."""
 ON_LINE = 8.0 * EPS
 """Part of its value by which an input may leave a line by rounding alone."""
-LINE = 2
-"""Coefficients of an input where an expression takes it, which may be to a power or by a factor of the time: an answer
-serves no other change. Functions of the time alone have more."""
 DOUBTED = 300.0
 """Tolerances by which a jump may move points before the step beyond it is tested for a past that is of no use. To first
 order the answer to a jump is right to a part in some hundreds where contacts open at it: in random torques of 10 N m
@@ -210,8 +207,9 @@ def steer(bound, st, plan, factors, t, y, yp, places, value, end, cells, values,
     ----------
     bound, st, plan, factors, t, y, yp, cells, g
         As there.
-    places : ndarray of int, shape (p, 2)
-        Its places among the cells: of the time before the coefficients, and the number of these.
+    places : ndarray of int, shape (p, 3)
+        Its places among the cells: of the time before the coefficients, the number of these, and whether what stands
+        there is bent, see `gearmbs.dae.problem.Place`.
     value, end : float
         Where it goes, and when it is there: ``t`` for a jump.
     values : ndarray
@@ -225,8 +223,9 @@ def steer(bound, st, plan, factors, t, y, yp, places, value, end, cells, values,
     for k in range(cells.shape[0]):
         values[k] = st.rdata[cells[k]]
     at, place = places[0, 0], places[0, 0]
-    for p in range(1, places.shape[0]):
-        if places[p, 1] <= LINE:
+    for p in range(places.shape[0]):
+        if places[p, 2]:
+            # an answer serves no other change
             place = -1
     slope_before = values[at + 2]
     now = values[at + 1] + slope_before * (t - values[at])

@@ -35,7 +35,7 @@ class Standing(Struct):
         Those of the factors.
     cells : ndarray of int
         Places of named numbers in the table of numbers.
-    places : ndarray of int, shape (2 p,)
+    places : ndarray of int, shape (3 p,)
         Places of inputs among the cells: of the time before the coefficients, and the number of these.
     scratch : ndarray
         See `gearmbs.dae.integrators.stepping.jumps.pass_jump`.
@@ -130,7 +130,7 @@ def steer_on(bound, standing, t, row, first, count, value, end, values):
         t,
         st.y_out[row],
         st.yp_out[row],
-        matrix_at(own.places, 2 * first, count, 2),
+        matrix_at(own.places, 3 * first, count, 3),
         value,
         end,
         own.cells,
@@ -165,7 +165,7 @@ def steer_and_go_on(bound, standing, t, row, first, count, value, end, values, t
         t,
         st.y_out[row],
         st.yp_out[row],
-        matrix_at(own.places, 2 * first, count, 2),
+        matrix_at(own.places, 3 * first, count, 3),
         value,
         end,
         own.cells,
