@@ -176,6 +176,17 @@ def mode_table(named: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame({**rows, **sums}, index=named["mode"].values)
 
 
+UNEXCITED = 1e-9
+"""Share of a mode's energy that is none: rounding leaves 1e-12, and as little of the damping of a mode without any."""
+
+
+def gain_of(share: float, ratio: float) -> float:
+    """Return the gain at a crossing, by the share of the energy that is excited and the damping ratio."""
+    if share <= UNEXCITED:
+        return 0.0
+    return share / (2.0 * ratio) if ratio > 0.0 else np.inf
+
+
 def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Dataset:
     """Return a Campbell diagram with the names of its modes and the gain of each crossing."""
     named = named_modes(train, modes)
@@ -191,7 +202,7 @@ def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Datas
             share = one["energy"].sel(part=[m.name for m in train.meshings if part in (m.name, m.group, m.stage)]).sum()
         ratio = float(one["damping_ratio"])
         # the force that a mesh carries turns with its wheels, and may make a share that is all but none negative
-        gains.append(max(float(share), 0.0) / (2.0 * ratio) if ratio > 0.0 else np.inf)
+        gains.append(gain_of(float(share), ratio))
     names = [str(named["name"].sel(mode=int(k)).values) for k in diagram["mode"].values]
     return diagram.assign(
         critical_gain=("crossing", np.array(gains, dtype=float), {"units": "1"}),

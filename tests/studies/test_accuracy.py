@@ -269,7 +269,8 @@ def test_the_command_prints_errors_and_knows_what_it_is_for(tmp_path):
     train = tmp_path / "set.toml"
     train.write_text("[planetary]\n")
     done = CliRunner().invoke(app, ["run", str(train), "--accuracy", "1 %"])
-    assert done.exit_code == 2
+    assert done.exit_code == 1
+    assert "planetary.teeth" in done.output
 
 
 def test_bars_have_errors_of_their_own_shape():

@@ -180,10 +180,11 @@ class Watch:
 
     def _moved_with(self, number: int) -> tuple[int, np.ndarray]:
         """Return the row of the integrated body that a body moves with, 0 if at rest, and its axes in that one's."""
-        from gearmbs.dae.model.members import PLACE_A, PLACE_MASS
-
         if self.members is None:
             return number + 1, np.eye(3)
+        # kernels of runs with groups of bodies alone
+        from gearmbs.dae.model.members import PLACE_A, PLACE_MASS
+
         return int(self.members.group[number]), self.members.place[number, PLACE_A:PLACE_MASS].reshape(3, 3)
 
     def _places_of(self, body: int) -> np.ndarray:
