@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearmbs.signals import analyse, diagnose_bearing, make_signal
-from gearmbs.signals.rotation.sweep import moving_lines, still_orders
+from gearmbs.signals.rotation.sweep import moving_lines
 
 RATE, SECONDS = 12800.0, 5.0
 PART = np.arange(int(RATE * SECONDS)) / (RATE * SECONDS)
@@ -91,33 +91,3 @@ def test_mixed_up_rates_are_told_by_a_told_speed(told, true, teeth):
     else:
         assert "CHECK THE SPEED" in said
         assert f"{RATE:g} Hz, told as {wrong.attrs['sampling_rate']:g} Hz" in said
-
-
-def drifting(start=2000.0, end=2600.0, size=0.8):
-    """A line that moves on its own, as an inverter's."""
-    return size * np.cos(2 * np.pi * np.cumsum(start + (end - start) * PART) / RATE)
-
-
-@pytest.mark.parametrize("others", [drifting(), drifting() + drifting(4000.0, 5200.0), drifting(3000.0, 1500.0, 2.0)])
-@pytest.mark.parametrize("told", [1650.0, 1653.0])
-def test_a_line_that_drifts_beside_a_steady_shaft_is_no_run_up(others, told):
-    steady = record(1650.0)
-    shaft = sum(0.2 * np.cos(2 * np.pi * 27.5 * k * RATE * SECONDS * PART / RATE + k) for k in (3, 4, 5))
-    drifted = make_signal(steady.values[:, 0] + shaft + others, RATE, units="m/s^2")
-    assert moving_lines(drifted) is not None
-    assert {1, 2, 3, 4, 5} <= set(still_orders(drifted, told * np.pi / 30))
-    assert not any("move" in note for note in analyse(drifted, speed=f"{told} rpm").notes)
-    assert "move" not in " ".join(diagnose_bearing(drifted, "6205", f"{told} rpm").notes)
-
-
-@pytest.mark.parametrize("rpm", [
-    900 + 1500 * PART, 1500 + 60 * PART, 1500 + 300 * PART, 1650 + 600 * np.clip(5 * PART - 4, 0, 1),
-])  # fmt: skip
-def test_a_run_up_is_told_beside_lines_of_the_mains_and_of_another_machine(rpm):
-    """50 Hz hum stands still, as do the orders of a steady machine: neither are orders of the shaft."""
-    beside = sum(0.5 * np.cos(2 * np.pi * f * SECONDS * PART) for f in (50, 100, 150, 250, 47.3, 94.6, 141.9, 189.2))
-    seen = make_signal(record(rpm).values[:, 0] + beside, RATE, units="m/s^2")
-    mean = float(np.mean(rpm))
-    assert still_orders(seen, mean * np.pi / 30) == []
-    assert still_orders(seen, 1500.0 * np.pi / 30) == []
-    assert any(note.startswith("CHECK THE SPEED: lines") for note in analyse(seen, speed=f"{mean} rpm").notes)

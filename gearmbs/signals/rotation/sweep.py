@@ -5,9 +5,6 @@ is in the median over the pieces of their spectra and is taken off. Over the log
 shaft whose speed changes move by the same amount, so that pieces are correlated with later ones over such shifts. In a
 run-up the best shift up is better than the best one down, and than none, in hardly varying measure from pair to pair;
 Student's t over the pairs tells it from chance.
-
-A line of something else, an inverter, a resonance that grows warm, may move alone. The shaft's speed is steady where
-its orders stand still: lines at whole orders of the told speed that are there from the beginning to the end.
 """
 
 from __future__ import annotations
@@ -16,10 +13,9 @@ import math
 
 import numpy as np
 import scipy.fft
-import scipy.stats
 import xarray as xr
 
-from gearmbs.signals.rotation.speed import CLIP_DB, FLOOR_BINS, MAINS, MAINS_SHARE, RANGE_DB, prominence
+from gearmbs.signals.rotation.speed import CLIP_DB, FLOOR_BINS, RANGE_DB
 from gearmbs.signals.signal.signal import rate_of
 from gearmbs.signals.spectra import periodograms
 
@@ -41,22 +37,6 @@ SURE = 6.0
 """Student's t from which lines move. Of 154 public recordings of bearings and gears at one speed, and 120 made ones
 (loads that vary, knocks, speeds that wobble by 0.5 %) one reaches 5.1, all others stay below 4.5. A mesh that runs up
 by 4 % in 125 turns reaches 13, eleven orders of a shaft by 10 % in as many 6."""
-
-STANDS_DB = 12.0
-"""Height over the floor from which a line of the whole record is looked at."""
-MOST_LINES = 24
-"""Lines of the record that are looked at, the strongest."""
-EIGHTHS, STEADY = 8, 0.35
-"""Parts of the record in each of which a line that stands still is there, by so much of its median amplitude at least:
-a line whose frequency is off by half a turn in a part is 0 there, one with a load that varies by half remains."""
-EDGE = 2.0
-"""Lines of the spectrum by which two frequencies may be off and be one."""
-SAME_SPEED = 0.01
-"""Share by which the told speed may be off."""
-FEWEST_STILL = 3
-"""Orders of the shaft that must stand still: two are at whole orders of something by chance."""
-CHANCE = 1e-3
-"""Probability that so many of the lines that stand still lie on whole orders by chance, for all speeds tried."""
 
 FOLLOWED, BESIDE = 0.225, 0.4
 """Turns of the shaft: up to the first the phase of a mesh line is followed, filter's slope included; what a speed that
@@ -147,64 +127,10 @@ def _heights(power: np.ndarray) -> np.ndarray:
     return heights.mean(axis=3).reshape(power.shape[0], -1)
 
 
-def still_orders(signal: xr.DataArray, speed: float) -> list[int]:
-    """Return the orders of a shaft at whose lines a record stands still, if these are no chance; else an empty list.
-
-    Multiples of the mains stand still whatever the shaft does, and count for nothing.
-
-    Parameters
-    ----------
-    signal : xarray.DataArray
-        Dimensions (time, channel).
-    speed : float
-        Told, rad/s.
-    """
-    rate, n, turn = rate_of(signal), signal.sizes["time"], speed / math.tau
-    width = rate / n
-    if turn < EIGHTHS * EDGE * width or turn > rate / 8.0:
-        return []
-    values = signal.values - signal.values.mean(axis=0)
-    window = np.hanning(n)[:, None]
-    power = np.abs(scipy.fft.rfft(values * window, axis=0)) ** 2
-    best = power / np.maximum(power.max(axis=0), 1e-300)
-    height, level = prominence(power).max(axis=1), best.max(axis=1)
-    inner = (level[1:-1] > level[:-2]) & (level[1:-1] >= level[2:]) & (height[1:-1] >= STANDS_DB)
-    peaks = 1 + np.flatnonzero(inner)
-    peaks = peaks[peaks * width > 0.5 * turn]
-    peaks = peaks[np.argsort(level[peaks])[::-1][:MOST_LINES]]
-    still = np.array([at * width for at in peaks if _stands_still(values[:, int(np.argmax(best[at]))], int(at))])
-    mains = [abs(f / m - round(f / m)) * m <= MAINS_SHARE * f + EDGE * width for f in still for m in MAINS]
-    still = still[~np.array(mains, dtype=bool).reshape(-1, len(MAINS)).any(axis=1)]
-    if still.size < FEWEST_STILL:
-        return []
-    step = width / (still.max() / turn)
-    tried = turn + step * np.arange(-math.ceil(SAME_SPEED * turn / step), math.ceil(SAME_SPEED * turn / step) + 1)
-    orders = np.rint(still[:, None] / tried)
-    on = np.abs(still[:, None] - orders * tried) <= EDGE * width
-    k = int(np.argmax(on.sum(axis=0)))
-    found = on[:, k].sum()
-    part = min(1.0, 2.0 * EDGE * width / turn)
-    if found < FEWEST_STILL or tried.size * scipy.stats.binom.sf(found - 1, still.size, part) > CHANCE:
-        return []
-    return sorted({int(order) for order in orders[on[:, k], k]})
-
-
-def _stands_still(values: np.ndarray, line: int) -> bool:
-    """Whether a line of the whole record is there in each part of it."""
-    length = len(values) // EIGHTHS
-    cycles = line / len(values)
-    rotating = np.exp(-2j * math.pi * cycles * np.arange(length)) * np.hanning(length)
-    parts = np.abs(values[: EIGHTHS * length].reshape(EIGHTHS, length) @ rotating)
-    return bool(parts.min() >= STEADY * np.median(parts))
-
-
 def remark_sweep(signal: xr.DataArray, speed: float) -> list[str]:
-    """Return what is to be said where the lines of a record move and one speed (rad/s) is taken for all of it.
-
-    Nothing where the shaft's own orders stand still: what moves is something else.
-    """
+    """Return what is to be said where the lines of a record move and one speed (rad/s) is taken for all of it."""
     way = moving_lines(signal)
-    if way is None or still_orders(signal, speed):
+    if way is None:
         return []
     return [
         f"CHECK THE SPEED: lines of the record move {way} in it, as in a {'run-up' if way == 'up' else 'coast-down'}, "
