@@ -418,3 +418,13 @@ def test_a_ramp_with_a_unit_of_its_own_is_no_clock(tmp_path):
     signal = read_signal(path, rate=RATE)
     assert list(signal["channel"].values) == ["torque", "a"]
     assert signal.attrs["sampling_rate"] == RATE
+
+
+@pytest.mark.parametrize("heading", ["Index,x [ms],acc [g]", "Nr,angle [deg],acc [g]", "Sample,position [mm],acc [g]"])
+def test_a_second_column_with_a_heading_of_its_own_is_no_time_in_seconds(tmp_path, heading):
+    """Behind numbers of rows it is time where it has none."""
+    k = np.arange(64)
+    rows = "\n".join(f"{i},{0.1 * i:.4f},{np.sin(i):.5f}" for i in k)
+    (tmp_path / "q.csv").write_text(f"{heading}\n{rows}\n")
+    with pytest.raises(MissingMetadataError, match=says("rate")):
+        read_signal(tmp_path / "q.csv")

@@ -31,12 +31,14 @@ from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
 from gearmbs.signals.encoders.visible import (
+    EVEN,
     MOST_HARMONICS,
     Order,
     folded_onto,
     hidden_harmonics,
     shadow,
     standing_harmonics,
+    unevenness,
     visible_orders,
 )
 from gearmbs.signals.errors import MissingMetadataError, SignalError
@@ -322,7 +324,8 @@ def _all_lines(
 ) -> tuple[list[_Measured], dict[Fraction, tuple[str, int]]]:
     """Evaluate all runs; with known marks, also the shafts' orders that turn out to be later mesh harmonics, folded."""
     trains = (runs[0].driver, runs[0].driven)
-    hidden = hidden_harmonics(gearing, trains, orders)
+    even = max(map(unevenness, trains)) <= EVEN
+    hidden = hidden_harmonics(gearing, trains, orders) if even else [[], []]
     measured = [_lines_of(run, gearing, orders, hidden, errors) for run in runs]
     if any(known is None for known in errors.values()):
         return measured, {}

@@ -30,6 +30,7 @@ from gearmbs.signals.files.text_tables import (
     GAP_CELLS,
     HEAD_LINES,
     INDEX_NAMES,
+    LONGEST_SECONDS,
     CsvLayout,
     Times,
     cell_kind,
@@ -52,7 +53,7 @@ from gearmbs.signals.signal.record import (
     rate_from_times,
     speed_of,
 )
-from gearmbs.signals.signal.signal import check_teeth
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 from gearmbs.wording import warn
 
 CHUNK_ROWS = 1 << 17
@@ -352,10 +353,12 @@ def _record(
             dropped.add(layout.index)
             notes.append(meaning)
             clock = seconds if seconds is not None else clock
-            if clock is None and values.shape[1] - len(dropped) > 1 and 1 not in dropped:
-                # beside the numbers of the rows
+            bare = layout.names[1:2] == ["ch2"] and layout.units[1].lower() in ("", UNKNOWN_UNITS)
+            if clock is None and bare and values.shape[1] - len(dropped) > 1 and 1 not in dropped:
+                # beside the numbers of the rows, and without a heading that says otherwise
                 times = values[:, 1]
-                if len(times) >= FEWEST_EVEN and rises_evenly(times) and not np.all(np.diff(times) == 1.0):
+                even = len(times) >= FEWEST_EVEN and rises_evenly(times) and not np.all(np.diff(times) == 1.0)
+                if even and float(times[1] - times[0]) <= LONGEST_SECONDS:
                     dropped.add(1)
                     notes.append("The second column rises evenly; it is taken for the time in s.")
                     clock = times
