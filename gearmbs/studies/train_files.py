@@ -237,12 +237,12 @@ def _gear(gear: GearSpec, where: str) -> dict[str, Any]:
 
 
 def _planetary(gears: PlanetarySet, where: str) -> dict[str, Any]:
-    """Return a planetary set by the teeth of its wheels and what these have in common.
+    """Return a planetary set by the teeth of its wheels, what these have in common, and what each has of its own.
 
     Raises
     ------
     DrivetrainError
-        For a set of wheels that differ in more than teeth and profile shift.
+        For a set whose wheels differ in material.
     """
     wheels = {member: _gear(getattr(gears, member), where) for member in ("sun", "planet", "ring")}
     sun = wheels["sun"]
@@ -252,8 +252,12 @@ def _planetary(gears: PlanetarySet, where: str) -> dict[str, Any]:
     of_set = ("helix_angle", "hand", "pressure_angle")
     table |= {key: sun[key] for key in of_set if key in sun}
     table["face_width"] = _form(gears.sun.face_width, where)
-    apart = ("teeth", "module", "profile_shift", "internal", "name", "face_width", *of_set)
-    others = {key: value for key, value in sun.items() if key not in apart}
+    apart = ("teeth", "module", "profile_shift", "internal", "name", *of_set)
+    fields = {m: {k: v for k, v in wheel.items() if k not in apart} for m, wheel in wheels.items()}
+    common = {k: v for k, v in fields["sun"].items() if all(one.get(k) == v for one in fields.values())}
+    own = {m: {k: v for k, v in one.items() if k not in common} for m, one in fields.items()}
+    common.pop("face_width", None)
+    others = common | {m: one for m, one in own.items() if one}
     table |= {"wheels": others} if others else {}
     for key, value in settings_of(gears):
         if key in ("sun", "planet", "ring", "planets", "name") or value is None:
