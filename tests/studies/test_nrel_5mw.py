@@ -6,7 +6,10 @@ import warnings
 import numpy as np
 import pytest
 
-from gearmbs.studies import load_train
+from gearmbs.studies import load_train, train_modes
+
+# to make its 12 pairs takes a second
+pytestmark = pytest.mark.slow
 
 TIPS = {
     "third": ((1395.372, 1334.248), (380.751, 319.627)),
@@ -86,10 +89,45 @@ def test_rated_torques(train):
     np.testing.assert_allclose(gives, 0.238e-3, rtol=2e-3)
 
 
-@pytest.mark.slow
 def test_energy_is_closed(train):
     solution = train.build().simulate(0.02, rate=20_000, tol=1e-7, rate_scale=train.rate_scale)
     balance = solution.energy_balance()
     assert balance.relative_imbalance < 1e-5
     # the wind's torque comes on over a second and the rotor turns at 1.27 rad/s
     assert float(abs(balance.kinetic[0])) > 0.5 * 57231535.0 * (12.1 * math.pi / 30) ** 2
+
+
+def test_the_first_mode_is_that_of_what_gives_in_series(train):
+    """Two inertias on all that gives between them, referred to the rotor; meshes below 200 Hz are stiff as statics."""
+    first, second, third = 75 / 19, 37 / 6, 95 / 24
+    gives = [1.0 / train.part("hub").tangent]
+    i1, i2 = first**2, (first * second) ** 2
+    bars = [
+        (0.7, 1.667, 1),
+        (0.4, 0.2455, i1),
+        (0.533, 0.775, i1),
+        (0.2, 0.275, i2),
+        (0.333, 0.666, i2),
+        (0.4, 0.18, i2),
+    ]
+    shear = 2.1e11 / 2.6
+    gives += [32.0 * length / (shear * math.pi * d**4) / ratio for d, length, ratio in bars]
+    for stage, ratio in (("first", 1.0), ("second", i1)):
+        gears = train.part(stage).gears
+        along = train.part(stage).on_pins.across[1]
+        gives.append(1.0 / (3 * along * gears.carrier_radius**2) / ratio)
+        sun, ring = gears.sun.base_radius, gears.ring.base_radius
+        for mesh in (f"{stage} sun-planet 1", f"{stage} planet 1-ring"):
+            # torque on the carrier over the force of a mesh: three times both base radii
+            gives.append(1.0 / (3 * train.mesh_springs[mesh].stiffness * (sun + ring) ** 2) / ratio)
+    gives.append(1.0 / (4 * 1e9 * 1.5**2))
+    referred = {"intermediate": first, "fast": first * second, "high": first * second * third}
+    referred["generator"] = referred["high"]
+    chain = train.torsional()
+    inertia = dict(zip(chain.names, chain.inertias, strict=True))
+    behind = sum(inertia[name] * ratio**2 for name, ratio in referred.items())
+    expected = math.sqrt((1.0 / inertia["rotor"] + 1.0 / behind) / sum(gives)) / (2.0 * math.pi)
+    modes = train_modes(train)
+    slow = modes.frequencies[modes.oscillating]
+    # teeth of contact ratio 1.1 are not as stiff at each moment as in the mean
+    assert slow[slow > 0.5][0] == pytest.approx(expected, rel=0.01)

@@ -149,7 +149,10 @@ def again(thing: Drivetrain | Description) -> Description:
     return make_description(tomllib.loads(train_toml(thing)), "again", tooth_fault)
 
 
-@pytest.mark.parametrize("name", ["bench", "crank_slider", "gearbox", "nrel_5mw", "rattle", "resonance"])
+@pytest.mark.parametrize(
+    "name",
+    ["bench", "crank_slider", "gearbox", "rattle", "resonance", pytest.param("nrel_5mw", marks=pytest.mark.slow)],
+)
 def test_files_of_the_package_come_back_equal(name):
     told = read_description(FOLDER / f"{name}.toml", tooth_fault)
     assert again(told) == told
