@@ -25,8 +25,6 @@ STORED = Path(__file__).parents[1] / "data" / "nrel_5mw.nc"
 RUN = RunSettings(settling=0.2, duration=0.8, tolerance=1e-6)
 BROKEN = faults.BrokenTooth(wheel="driven", tooth=5, lost=0.9)
 ERRORS = np.array([50e-6, 100e-6])
-POSITIONS = 3
-"""Of the carrier of the first stage, over a third of its turn."""
 STAGES = ("first", "second")
 MODES = 40
 KEPT = ("housing at HS-A", "generator speed")
@@ -105,11 +103,6 @@ def shares(train: Drivetrain) -> np.ndarray:
     return 3.0 * force / force.sum(axis=1, keepdims=True)
 
 
-def turned(train: Drivetrain, angle: float) -> Drivetrain:
-    """Return the gearbox with its first carrier turned."""
-    return train.changed("main", angle=angle)
-
-
 def weighed(train: Drivetrain) -> Drivetrain:
     """Return the gearbox with its weight."""
     return replace(train, gravity=(0.0, -9.81, 0.0))
@@ -135,11 +128,8 @@ def computed() -> xr.Dataset:
     """Return all that the page reads."""
     train = load_train("nrel_5mw").train
     out = xr.Dataset(coords={"stage": list(STAGES), "planet": [1, 2, 3], "error": ERRORS})
-    angles = np.arange(POSITIONS) * 2.0 * math.pi / 3.0 / POSITIONS
     for name, one in (("plain", train), ("weight", weighed(train))):
-        found = np.array([shares(turned(one, angle)) for angle in angles])
-        out[name] = ("angle", "stage", "planet"), found
-    out = out.assign_coords(angle=angles)
+        out[name] = ("stage", "planet"), shares(one)
     found = np.array([[shares(off(train, stage, e))[k] for e in ERRORS] for k, stage in enumerate(STAGES)])
     out["off"] = ("stage", "error", "planet"), found
     named = named_modes(ideal(train))
