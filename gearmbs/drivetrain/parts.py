@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, require
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import ContactLaw, FlankFriction
-from gearmbs.gears.pair import GearPair
+from gearmbs.gears.pair import GearPair, before_own_law
 from gearmbs.gears.spec import GearSpec
 from gearmbs.schema.described import chosen
 from gearmbs.schema.quantities import Measure
@@ -113,9 +113,10 @@ class GearMesh(Part):
                 return _ideal(self.label, kind, driver, driven, {**given, **operation}, own)
             if not (isinstance(kind, type) and issubclass(kind, GearPair)):
                 return kind(driver, driven, **operation, **given, **own)
-            pair = kind(driver, driven, **operation, **given)
             if "contact" in given:
-                return pair
+                return kind(driver, driven, **operation, **given)
+            with before_own_law():
+                pair = kind(driver, driven, **operation, **given)
             varies = given.get("stiffness_curve") == "potential-energy"
             return pair.with_own_stiffness(
                 own.get("stiffness", "potential-energy" if varies else "iso"), own.get("damping_ratio")
@@ -134,7 +135,8 @@ def _ideal(
     """
     parting = truth(given.pop("ideal_backlash", False), "ideal_backlash")
     curves = {key: given.pop(key) for key in ("stiffness_curve", "error") if key in given}
-    pair = GearPair(driver, driven, **given)
+    with before_own_law():
+        pair = GearPair(driver, driven, **given)
     stiffness, ratio = own.get("stiffness", "iso"), own.get("damping_ratio")
     if stiffness not in ("iso", "iso single", "potential-energy"):
         return kind.with_damping_ratio(pair, stiffness, ratio, backlash=parting, **curves)

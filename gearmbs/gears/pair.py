@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import InitVar, dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypedDict, Unpack
@@ -69,6 +71,14 @@ class PaperKeywords(PairKeywords, total=False):
     """What may be changed of the paper's pair: its fields, and the face width of both wheels."""
 
     face_width: QuantityLike
+
+
+@contextmanager
+def before_own_law() -> Iterator[None]:
+    """Leave out how far the flanks of a pair yield by the law that it has before `GearPair.with_own_stiffness`."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*the flanks yield")
+        yield
 
 
 @dataclass(frozen=True)

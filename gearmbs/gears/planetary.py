@@ -13,6 +13,8 @@ from gearmbs.gears.spec import GearSpec
 from gearmbs.units import Quantity, QuantityLike
 from gearmbs.wording import did_you_mean
 
+WHEELS = ("sun", "planet", "ring")
+
 
 class PlanetaryKeywords(TypedDict, total=False):
     """Fields of a `PlanetarySet` but for its wheels and their number, as they are given, for type checkers."""
@@ -66,7 +68,7 @@ def planetary(
         ISO 21771; see `GearSpec`.
     pressure_angle : float or str
     wheels : mapping, optional
-        Further fields of `GearSpec`, for all wheels.
+        Further fields of `GearSpec`, for all wheels; under "sun", "planet" and "ring" those of one.
     **settings
         Further fields of `PlanetarySet`.
 
@@ -85,20 +87,22 @@ def planetary(
     other = {"right": "left", "left": "right"}
     if hand not in other:
         raise ValueError(f"planetary: hand is {hand!r}; choose 'right' or 'left'")
+    own, common = {}, {"face_width": face_width, **(wheels or {})}
+    for name in WHEELS:
+        own[name] = common.pop(name, {})
     made = []
-    for name, z, x, sense in zip(("sun", "planet", "ring"), teeth, profile_shifts, (hand, other[hand], other[hand])):
+    for name, z, x, sense in zip(WHEELS, teeth, profile_shifts, (hand, other[hand], other[hand])):
         made.append(
             GearSpec(
                 abs(z),
                 module,
                 pressure_angle=pressure_angle,
-                face_width=face_width,
                 profile_shift=x,
                 helix_angle=helix_angle,
                 hand=sense,  # type: ignore[arg-type]
                 internal=name == "ring",
                 name=name,
-                **(wheels or {}),
+                **{**common, **own[name]},
             )
         )
     sun, planet, ring = made

@@ -35,14 +35,15 @@ class Support(Written):
     Parameters
     ----------
     radial, axial : float or str
-        Stiffness, N/m. Without ``axial`` the member stays in its plane.
+        Stiffness, N/m. Without ``axial`` the member stays in its plane. ``radial`` may be a pair: of a pin away from
+        the carrier's axis and along its circle, of a member along x and y.
     torsional, tilting : float or str
         About the axis and across it, N m/rad.
     damping : float or str
         Time that times a stiffness is a damping, s.
     """
 
-    radial: Quantity = 0.0
+    radial: Quantity | tuple[Quantity, Quantity] = 0.0
     axial: Quantity = 0.0
     torsional: Quantity = 0.0
     tilting: Quantity = 0.0
@@ -51,10 +52,20 @@ class Support(Written):
     def __post_init__(self) -> None:
         units = {"radial": "N/m", "axial": "N/m", "torsional": "N*m/rad", "tilting": "N*m/rad", "damping": "time"}
         for name, unit in units.items():
-            value = to_si(getattr(self, name), unit, f"Support.{name}")
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"Support.{name} is {value}; give 0 or more")
-            object.__setattr__(self, name, value)
+            given = getattr(self, name)
+            several = name == "radial" and isinstance(given, tuple | list)
+            values = tuple(to_si(one, unit, f"Support.{name}") for one in (given if several else (given,)))
+            if several and len(values) != 2:
+                raise ValueError(f"Support.radial is {given!r}; give one stiffness, or a pair")
+            for value in values:
+                if not (math.isfinite(value) and value >= 0):
+                    raise ValueError(f"Support.{name} is {value}; give 0 or more")
+            object.__setattr__(self, name, values if several else values[0])
+
+    @property
+    def across(self) -> tuple[float, float]:
+        """Both stiffnesses across the axis, N/m."""
+        return self.radial if isinstance(self.radial, tuple) else (self.radial, self.radial)  # type: ignore[return-value]
 
 
 def planetary_mechanism(
@@ -234,7 +245,7 @@ def _support(
     on_i, on_j = i.marker(name=f"{name}.I"), j.marker_at(place, axes, name=f"{name}.J")
     if support.axial == 0.0:
         m.joint("planar", f"{name} plane", on_i, on_j)
-    k = (support.radial, support.radial, support.axial)
+    k = (*support.across, support.axial)
     kt = (support.tilting, support.tilting, support.torsional) if support.axial else (0.0, 0.0, support.torsional)
     if any((*k, *kt)):
         # about its axis the member stands as it is: springs count from there
@@ -329,7 +340,8 @@ def add_planets(
         if pins is None:
             m.revolute(f"{name} pin", planet, carrier, at=place, axis=axes[:, 2])
         elif isinstance(pins, Support):
-            _support(m, f"{name} pin", planet, carrier, pins, place, axes)
+            # towards the carrier's axis and along its circle
+            _support(m, f"{name} pin", planet, carrier, pins, place, axes @ turn_z(psi))
         else:
             # the bearing's rings keep their plane as a spring without axial stiffness does
             pin = carrier.marker_at(place, axes, name=f"{name} pin.I")

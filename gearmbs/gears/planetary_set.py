@@ -8,7 +8,6 @@ stepped planet has a wheel of its own for the ring.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,7 +20,7 @@ from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import ContactLaw, FlankFriction, sense_of_rotation
 from gearmbs.gears.modifications import Fault
-from gearmbs.gears.pair import GearPair
+from gearmbs.gears.pair import GearPair, before_own_law
 from gearmbs.gears.spec import GearSpec, convert_fields
 from gearmbs.units import Quantity, to_si
 from gearmbs.wording import warn
@@ -325,9 +324,7 @@ class PlanetarySet(Written):
                     "faults": faults,
                 }
                 if self.contact is None:
-                    with warnings.catch_warnings():
-                        # how far flanks yield is told of the law that they get
-                        warnings.filterwarnings("ignore", message=".*the flanks yield")
+                    with before_own_law():
                         pair = GearPair(one, two, **given)
                     made[faults] = pair.with_own_stiffness(self.stiffness or "iso", self.damping_ratio)
                 else:

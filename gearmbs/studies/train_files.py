@@ -372,12 +372,12 @@ def _gear(gear: GearSpec, where: str, texts: bool) -> dict[str, Any]:
 
 
 def _planetary(gears: PlanetarySet, where: str, texts: bool) -> dict[str, Any]:
-    """Return a planetary set by the teeth of its wheels and what these have in common.
+    """Return a planetary set by the teeth of its wheels, what these have in common, and what each has of its own.
 
     Raises
     ------
     DrivetrainError
-        For a set of wheels that differ in more than teeth and profile shift.
+        For a set whose wheels differ in material.
     """
     wheels = {member: _gear(getattr(gears, member), where, texts) for member in ("sun", "planet", "ring")}
     sun = wheels["sun"]
@@ -387,8 +387,12 @@ def _planetary(gears: PlanetarySet, where: str, texts: bool) -> dict[str, Any]:
     of_set = ("helix_angle", "pressure_angle", *(("hand",) if gears.sun.helix_angle else ()))
     table |= {key: sun[key] for key in of_set if key in sun}
     table["face_width"] = _form(gears.sun.face_width, where, texts)
-    apart = ("teeth", "module", "profile_shift", "internal", "face_width", "hand", *of_set)
-    others = {key: value for key, value in sun.items() if key not in apart}
+    apart = ("teeth", "module", "profile_shift", "internal", "hand", *of_set)
+    every = {m: {k: v for k, v in wheel.items() if k not in apart} for m, wheel in wheels.items()}
+    common = {k: v for k, v in every["sun"].items() if all(one.get(k) == v for one in every.values())}
+    own = {m: {k: v for k, v in one.items() if k not in common} for m, one in every.items()}
+    common.pop("face_width", None)
+    others = common | {m: one for m, one in own.items() if one}
     table |= {"wheels": others} if others else {}
     for key, value in settings_of(gears):
         if key in ("sun", "planet", "ring", "planets", "name") or value is None:

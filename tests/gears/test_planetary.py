@@ -397,6 +397,31 @@ def test_torques_that_something_feels_are_taken():
     assert {"ring load", "carrier load"} <= set(m.elements)
 
 
+def test_pins_that_are_stiffer_along_their_circle():
+    """Under its weight a planet at the angle psi gives by m g (cos^2 psi / k_r + sin^2 psi / k_t)."""
+    weak = planetary((24, 30, 84), "1.5 mm", ideal=(1.0, 1.0))
+    pins = Support(radial=("2e6 N/m", 5e6))
+    m = mechanism_of(weak, held="carrier", pins=pins, speeds={"sun": 0.0}, run_up=0, gravity=(9.81, 0.0, 0.0))
+    rest = static_equilibrium(m).solution
+    weight = 9.81 * weak.planet.mass
+    for k, psi in enumerate(weak.angles, start=1):
+        lower = rest.com_position(f"planet {k}")[-1][0] - m.bodies[f"planet {k}"].position[0]
+        expected = weight * (math.cos(psi) ** 2 / 2e6 + math.sin(psi) ** 2 / 5e6)
+        assert lower == pytest.approx(expected, rel=1e-4)
+    assert Support(radial=3.0).across == (3.0, 3.0)
+    with pytest.raises(ValueError, match=says("radial", "pair")):
+        Support(radial=(1.0, 2.0, 3.0))
+
+
+def test_wheels_of_a_set_have_fields_of_their_own():
+    gears = planetary(
+        (24, 30, 84),
+        "1.5 mm",
+        wheels={"bore_radius": "4 mm", "planet": {"bore_radius": "8 mm"}, "ring": {"bore_radius": 0.0}},
+    )
+    assert [w.bore_radius for w in (gears.sun, gears.planet, gears.ring)] == [0.004, 0.008, 0.0]
+
+
 @pytest.mark.parametrize("name", ["backlash_sun", "backlash_ring"])
 def test_negative_backlash_is_refused(name):
     for value in ("-1 mm", -1e-9):

@@ -353,7 +353,8 @@ def _record(
             dropped.add(layout.index)
             notes.append(meaning)
             clock = seconds if seconds is not None else clock
-            bare = layout.names[1:2] == ["ch2"] and layout.units[1].lower() in ("", UNKNOWN_UNITS)
+            named = [name.strip().lower() for name in layout.names[1:2]]
+            bare = named in (["ch2"], ["s"]) and layout.units[1].lower() in ("", UNKNOWN_UNITS)
             if clock is None and bare and values.shape[1] - len(dropped) > 1 and 1 not in dropped:
                 # beside the numbers of the rows, and without a heading that says otherwise
                 times = values[:, 1]
