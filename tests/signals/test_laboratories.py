@@ -426,5 +426,5 @@ def test_a_second_column_with_a_heading_of_its_own_is_no_time_in_seconds(tmp_pat
     k = np.arange(64)
     rows = "\n".join(f"{i},{0.1 * i:.4f},{np.sin(i):.5f}" for i in k)
     (tmp_path / "q.csv").write_text(f"{heading}\n{rows}\n")
-    with pytest.raises(MissingMetadataError, match=says("rate")):
+    with pytest.raises(MissingMetadataError, match=says("rate", "q.csv")):
         read_signal(tmp_path / "q.csv")

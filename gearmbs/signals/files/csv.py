@@ -353,8 +353,9 @@ def _record(
             dropped.add(layout.index)
             notes.append(meaning)
             clock = seconds if seconds is not None else clock
-            named = [name.strip().lower() for name in layout.names[1:2]]
-            bare = named in (["ch2"], ["s"]) and layout.units[1].lower() in ("", UNKNOWN_UNITS)
+            second = layout.names[1].strip() if len(layout.names) > 1 else "none"
+            # with a colon it is a line of the header
+            bare = (second == "ch2" or second.endswith(":")) and layout.units[1].lower() in ("", UNKNOWN_UNITS)
             if clock is None and bare and values.shape[1] - len(dropped) > 1 and 1 not in dropped:
                 # beside the numbers of the rows, and without a heading that says otherwise
                 times = values[:, 1]
