@@ -348,7 +348,7 @@ class HeldRun(Run):
         rows.y[row], rows.yp[row] = value_in(self, self.last_step(), t)
         rows.kept[row] = self.state.rdata[self.state.kept]
 
-    def change(self, point: tuple, cells: np.ndarray, change: tuple[np.ndarray, bool, bool, bool, Any]) -> None:
+    def change(self, point: tuple, cells: np.ndarray, change: tuple[np.ndarray, bool, bool, bool, bool, bool]) -> None:
         """Cut the last step back to a time within it, and go on from there with other numbers in the equations.
 
         Parameters
