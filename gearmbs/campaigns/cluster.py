@@ -188,6 +188,9 @@ class DaskRunner:
         if future.status == "finished":
             return future.result()
         error = future.exception()
+        if error is None:
+            # its worker died with the result, and another one has found it since
+            return future.result()
         # a worker that dies takes the units of its neighbours' queues with it: all are tried again
         if type(error).__name__ in ("KilledWorker", "CancelledError", "FutureCancelledError"):
             return DEATH, None

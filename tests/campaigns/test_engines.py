@@ -206,3 +206,18 @@ def test_clusters_of_batch_systems(system, words):
     assert "export NUMBA_NUM_THREADS=1" in script
     with pytest.raises(CampaignError, match="write hours"):
         batch_cluster(system, walltime="2h")
+
+
+def test_a_result_that_was_lost_with_its_worker_and_found_again_counts():
+    """The future is not finished when it is looked at, and has no error by the time it is asked for one."""
+
+    class Lost:
+        status = "lost"
+
+        def exception(self):
+            self.status = "finished"
+
+        def result(self):
+            return "done", 7
+
+    assert DaskRunner._end(Lost()) == ("done", 7)
