@@ -103,7 +103,7 @@ class MotionProblem(LevelProblem):
         By channel an expression in the function language of ADAMS, or what makes numbers of a solution, shape (m,).
     period : float or str, optional
         After which the motion repeats itself, s; of a drivetrain by default that of its teeth.
-    frequency : float or mapping of str to float, optional
+    frequency : float, str, or mapping of str to these, optional
         Of the first harmonic, Hz, for all channels or by channel; default 1/period. That of a mesh, or of a shaft whose
         orders were measured.
     gains : str
@@ -125,7 +125,7 @@ class MotionProblem(LevelProblem):
         results: Mapping[str, Result],
         *,
         period: QuantityLike | None = None,
-        frequency: Mapping[str, float] | float | None = None,
+        frequency: Mapping[str, QuantityLike] | QuantityLike | None = None,
         gains: Gains = "none",
         **settings: Unpack[SteadyOptions],
     ) -> None:
@@ -135,7 +135,7 @@ class MotionProblem(LevelProblem):
         self.free, self.results, self.settings = self._models.free, dict(results), settings
         _check_channels(self.table["channel"], results)
         self._period = None if period is None else float(to_si(period, "time", "period"))
-        self._frequency = frequency
+        self._frequency = _frequencies(frequency, list(results))
         self._known: dict[tuple[str, tuple[float, ...]], tuple[np.ndarray, np.ndarray | None]] = {}
         self._own = True
         self.motions = 0
@@ -229,8 +229,7 @@ class MotionProblem(LevelProblem):
 
     def _cycles(self, channel: str, period: float) -> int:
         """Return how many cycles of a channel's first harmonic a period has."""
-        given = self._frequency
-        frequency = given.get(channel) if isinstance(given, Mapping) else given
+        frequency = self._frequency.get(channel)
         cycles = 1.0 if frequency is None else frequency * period
         if abs(cycles - round(cycles)) > WHOLE * max(1.0, cycles) or round(cycles) < 1:
             raise IdentifyError(
@@ -243,6 +242,19 @@ class MotionProblem(LevelProblem):
     def _logs(lines: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
             return np.log(np.abs(lines) / np.sqrt(2.0))
+
+
+def _frequencies(given: Any, channels: Sequence[str]) -> dict[str, float]:
+    """Return the frequencies of first harmonics by channel, Hz; refuse those of channels that there are not."""
+    if given is None:
+        return {}
+    table = given if isinstance(given, Mapping) else dict.fromkeys(channels, given)
+    for name in table:
+        if name not in channels:
+            raise IdentifyError(
+                f"frequency: there is no channel {name!r}; results has {', '.join(map(repr, channels))}"
+            )
+    return {name: float(to_si(value, "frequency", f"frequency[{name!r}]")) for name, value in table.items()}
 
 
 def _relative(lines: np.ndarray, slopes: np.ndarray) -> np.ndarray:

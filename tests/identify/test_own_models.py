@@ -157,3 +157,19 @@ def test_a_planetary_set_from_the_harmonics_of_a_mesh():
     ]
     problem = MotionProblem(pd.DataFrame(rows, columns=COLUMNS), made, [Free("torque", 45.0)], results, period=period)
     assert problem.fit()["torque"] == pytest.approx(50.0, rel=1e-2)
+
+
+@pytest.mark.slow
+def test_frequencies_are_of_channels_that_there_are_and_may_be_texts():
+    """3 cos 2t + cos 4t on k = 9 and d = 0.3: of frequency 2/pi Hz the line is 1/|k - 16 + 1.2 i|, RMS."""
+    table = pd.DataFrame([("a", "x", 1, 1.0, 0.02)], columns=COLUMNS)
+
+    def level(frequency):
+        problem = MotionProblem(table, shaken, FREE, {"x": "DX(I,J)"}, period=np.pi, frequency=frequency)
+        return float(np.exp(problem.predictions([np.array([9.0, 0.3])])[0])[0])
+
+    expected = 1.0 / abs(9.0 - 16.0 + 1.2j) / np.sqrt(2.0)
+    for frequency in (2.0 / np.pi, {"x": 2.0 / np.pi}, {"x": f"{2000.0 / np.pi!r} mHz"}):
+        assert level(frequency) == pytest.approx(expected, rel=1e-4)
+    with pytest.raises(IdentifyError, match=says("frequency", "X", "x")):
+        level({"X": 2.0 / np.pi})
