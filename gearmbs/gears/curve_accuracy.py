@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from gearmbs.units import QuantityLike, to_si
+from gearmbs.schema.quantities import accuracy_part
+from gearmbs.units import QuantityLike
 from gearmbs.wording import warn
 
 if TYPE_CHECKING:
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 Curve = TypeVar("Curve", bound=Any)
 """A `gearmbs.gears.transmission.TransmissionError`, of the functions there."""
 
-SMALLEST, LARGEST = 1e-6, 0.5
-"""Accuracies that can be asked for: angles are found to 1e-12 of the load, differences of curves to 1e-6 of them."""
+SMALLEST = 1e-6
+"""Least accuracy that can be asked for: angles are found to 1e-12 of the load, differences of curves to 1e-6."""
 SHARE = 0.5
 """Part of a difference that is taken as the error at least: of halved points 1/3 where the curve has kinks."""
 FEWEST_SLICES = 2
@@ -76,26 +77,6 @@ class CurveErrors:
         )
 
 
-def asked_part(accuracy: QuantityLike) -> float:
-    """Return an accuracy as a part.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or beyond what can be asked for.
-    """
-    try:
-        wanted = float(to_si(accuracy, "dimensionless", "accuracy"))
-    except (TypeError, ValueError):
-        wanted = 0.0
-    if not SMALLEST <= wanted <= LARGEST:
-        raise ValueError(
-            f"accuracy = {accuracy!r}: is a part of the peak to peak; give {SMALLEST:g} to {LARGEST:g}, such as 0.01 "
-            'or "1 %"'
-        )
-    return wanted
-
-
 def accurate_curve(
     curve: Callable[[int, int], Curve], pair: Mesh, accuracy: QuantityLike, points: int, slices: int | None
 ) -> Curve:
@@ -116,14 +97,14 @@ def accurate_curve(
     Raises
     ------
     ValueError
-        See `asked_part`; for a single slice, or an odd number of points.
+        For what is no accuracy; for a single slice, or an odd number of points.
 
     Warns
     -----
     UserWarning
         If the accuracy is not reached.
     """
-    wanted = asked_part(accuracy)
+    wanted = accuracy_part(accuracy, "the peak to peak", SMALLEST)
     own = pair.contact_model.slices
     given = slices if slices is not None else own
     sliced = _slices(pair)

@@ -5,6 +5,7 @@ Derivatives are either the model's own, then one evaluation gives residuals and 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, Unpack
@@ -25,7 +26,7 @@ COARSER = 10.0
 """By what the tolerance is larger at which own derivatives are taken once more, for their noise."""
 
 
-class Problem:
+class Problem(ABC):
     """Measured numbers and a model that predicts them.
 
     Attributes
@@ -40,23 +41,23 @@ class Problem:
     notes: list[str]
 
     @property
+    @abstractmethod
     def measured(self) -> np.ndarray:
         """What was measured, shape (m,), as it is predicted."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def sigma(self) -> np.ndarray:
         """Its standard deviations."""
-        raise NotImplementedError
 
     @property
     def lost(self) -> int:
         """Degrees of freedom that the model itself uses up."""
         return 0
 
+    @abstractmethod
     def predictions(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return predictions, shape (m,), for several parameter vectors; NaN where they fail."""
-        raise NotImplementedError
 
     def jacobian(self, p: np.ndarray) -> np.ndarray | None:
         """Return the derivatives of the predictions by the parameters, shape (m, n); None if there are none of its

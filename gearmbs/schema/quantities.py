@@ -263,6 +263,37 @@ def in_si(value: Any, dimension: str) -> float:
         raise NoQuantity(str(error).removeprefix("value: ")) from None
 
 
+LEAST_ACCURATE = 0.5
+"""Largest accuracy that can be asked for: beyond it a number is not known at all."""
+
+
+def accuracy_part(accuracy: Any, of: str, smallest: float) -> float:
+    """Return an accuracy that is asked for as a part, from a number or a text such as "1 %".
+
+    Parameters
+    ----------
+    accuracy : float or str
+    of : str
+        What it is a part of, for the message.
+    smallest : float
+
+    Raises
+    ------
+    ValueError
+        If it is none, or beyond what can be asked for.
+    """
+    try:
+        wanted = float(to_si(accuracy, "dimensionless", "accuracy"))
+    except (TypeError, ValueError):
+        wanted = 0.0
+    if not smallest <= wanted <= LEAST_ACCURATE:
+        raise ValueError(
+            f"accuracy = {accuracy!r}: is a part of {of}; give {smallest:g} to {LEAST_ACCURATE:g}, such as 0.01 or "
+            '"1 %"'
+        )
+    return wanted
+
+
 def _number(value: float | None) -> str:
     return "" if value is None else f"{value:g}"
 

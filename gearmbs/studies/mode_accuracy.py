@@ -75,7 +75,7 @@ def accurate_modes(
     UserWarning
         If the accuracy is not reached with all modes of the finite elements, or with those that files hold.
     """
-    wanted = asked_accuracy(accuracy)
+    wanted = asked_accuracy(accuracy, "each frequency")
     if below is None:
         below = HARMONICS * max((abs(train.kinematics.mesh_frequency(m.name)) for m in train.meshings), default=0.0)
     if not below > 0.0:

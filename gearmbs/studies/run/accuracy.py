@@ -24,12 +24,13 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from gearmbs.dae.methods import INTEGRATORS
+from gearmbs.schema.quantities import accuracy_part
 from gearmbs.studies.case.case import Case, CaseError, CaseWarning
 from gearmbs.studies.case.sections import LEAST_TOLERANCE
 from gearmbs.studies.run.levels import LEVELS
 from gearmbs.studies.run.periodic import HOLDS, LEAST_LEVEL, Found, Precision
 from gearmbs.studies.run.record import SERIES, VARIABLES
-from gearmbs.units import QuantityLike, to_si
+from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,8 +60,8 @@ FLOOR = 1e-4
 """Error that is told at least, as a part of the largest harmonic: below it errors of steps that kinks cut fall with a
 small power of the tolerance, and by chance."""
 
-SMALLEST, LARGEST = 2.0 * FLOOR, 0.5
-"""Accuracies that can be asked for; beyond the second there is no digit left."""
+SMALLEST = 2.0 * FLOOR
+"""Least accuracy that can be asked for."""
 
 FEWEST_SLICES = 3
 """Slices of a face along which flanks vary that can be judged: the twin has two of them at least."""
@@ -87,8 +88,8 @@ class Run(Protocol):
     ) -> Recorded: ...
 
 
-def asked_accuracy(accuracy: QuantityLike) -> float:
-    """Return an accuracy as a part, from a number or a text such as "1 %".
+def asked_accuracy(accuracy: QuantityLike, of: str = "the largest mesh harmonic of a component") -> float:
+    """Return an accuracy as a part; see `gearmbs.schema.quantities.accuracy_part`.
 
     Raises
     ------
@@ -96,15 +97,9 @@ def asked_accuracy(accuracy: QuantityLike) -> float:
         If it is none, or beyond what can be asked for.
     """
     try:
-        wanted = float(to_si(accuracy, "dimensionless", "accuracy"))
-    except (TypeError, ValueError):
-        wanted = 0.0
-    if not SMALLEST <= wanted <= LARGEST:
-        raise CaseError(
-            f"accuracy = {accuracy!r}: is a part of the largest mesh harmonic of a component; give {SMALLEST:g} to "
-            f'{LARGEST:g}, such as 0.01 or "1 %"'
-        )
-    return wanted
+        return accuracy_part(accuracy, of, SMALLEST)
+    except ValueError as error:
+        raise CaseError(str(error)) from None
 
 
 def check_accurate(case: Case, accuracy: QuantityLike) -> float:

@@ -157,21 +157,7 @@ def steer_and_go_on(bound, standing, t, row, first, count, value, end, values, t
     """
     own = standing_at(standing)
     st, plan, factors = state_at(own.state), plan_at(own.plan), factors_at(own.factors)
-    steered = steer(
-        bound,
-        st,
-        plan,
-        factors,
-        t,
-        st.y_out[row],
-        st.yp_out[row],
-        matrix_at(own.places, 3 * first, count, 3),
-        value,
-        end,
-        own.cells,
-        values,
-        own.scratch,
-    )
+    steered = steer_on(bound, standing, t, row, first, count, value, end, values)
     went = reach(bound, st, part_at(own.part), plan, factors, own.advance, t_next, row_next, last)
     return 4 * steered + went
 
