@@ -7,7 +7,7 @@ OUT ?= out
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: paper test quick wheel dist lint types bench docs clean
+.PHONY: paper test quick hunt wheel dist lint types bench docs clean
 
 # it compiles the kernels that it uses, half of all
 paper: $(VENV)/.installed
@@ -21,6 +21,11 @@ test: $(VENV)/.installed-dev
 quick: $(VENV)/.installed-dev
 	$(BIN)/python -m gearmbs.compile
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+
+# many more draws, or much longer runs, of what tests of the suite ask
+hunt: $(VENV)/.installed-dev
+	$(BIN)/python -m gearmbs.compile
+	$(BIN)/python -m pytest -n 2 -m hunt
 
 # what a user installs, tried away from the checkout
 wheel: $(VENV)/.installed-dev

@@ -2,7 +2,10 @@
 
 import ast
 import re
-from collections.abc import Iterator
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from functools import cache
+from itertools import accumulate
 
 FUNCTION_WORDS = set(
     "a an the is are was were be been not no nor of in to and or it its by with for at on as has have had that which "
@@ -15,8 +18,9 @@ VALUES = set("True False None nan inf mm kg Hz kHz rad deg ms MPa GPa rpm min".s
 """Numbers and units that are written as words."""
 
 
-HOLE, NOWHERE = "\0", "\1"
-"""What stands in texts for something that is formatted into them, and in patterns for what no text says."""
+HOLE, NOWHERE, BETWEEN = "\0", "\1", "\2"
+"""What stands in texts for something that is formatted into them, in patterns for what no text says, and after a text
+where many are searched as one."""
 
 
 def says(*words: str) -> str:
@@ -109,7 +113,7 @@ def _written_out(node: ast.AST) -> str | None:
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
 
 
-def fitting(node: ast.expr, texts: set[str]) -> list[str]:
+def fitting(node: ast.expr, texts: frozenset[str]) -> list[str]:
     """Return which of the texts that can be raised a test's pattern fits by what is written in both of them.
 
     Names and values that a test fills in are written in none.
@@ -117,14 +121,34 @@ def fitting(node: ast.expr, texts: set[str]) -> list[str]:
     parts = [(_written_out(part) or HOLE).replace(HOLE, NOWHERE) for part in getattr(node, "args", [node])]
     called = _name(node.func) if isinstance(node, ast.Call) else ""
     if called == "escape":
-        return [text for text in texts if parts[0] in text]
+        return list(_holding(parts[0], texts))
     if called == "says":
         pattern, inside = says(*parts), parts
     else:
         # a letter that may be missing, or one of two words, need not be there
         pattern, inside = parts[0], [] if re.search(r"\w[?*{]|[|\[(\\]", parts[0]) else re.findall(r"\w+", parts[0])
-    near = [text for text in texts if all(part in text for part in inside)]
+    near = [text for text in _holding(max(inside, key=len, default=""), texts) if all(part in text for part in inside)]
     return [text for text in near if re.search(pattern, text)] if called in ("", "says") else []
+
+
+def _holding(part: str, texts: frozenset[str]) -> Sequence[str]:
+    """Return the texts that hold a part. All are searched in one go, for patterns are many."""
+    if not part:
+        return list(texts)
+    whole, ends = _in_one(texts)
+    found, place = [], whole.find(part)
+    while place >= 0:
+        k = bisect_right(ends, place)
+        begin = ends[k - 1] if k else 0
+        found.append(whole[begin : ends[k] - 1])
+        place = whole.find(part, ends[k])
+    return found
+
+
+@cache
+def _in_one(texts: frozenset[str]) -> tuple[str, list[int]]:
+    """Return all texts one after another, and where each ends; what stands between them is in no text and no part."""
+    return "".join(text + BETWEEN for text in texts), list(accumulate(len(text) + 1 for text in texts))
 
 
 def _asked(function: ast.FunctionDef, tree: ast.Module) -> Iterator[ast.expr]:

@@ -167,6 +167,7 @@ def arrows() -> dict[str, frozenset[str]]:
 
 
 @pytest.mark.parametrize("package", sorted(MAY_KNOW))
+@pytest.mark.slow
 def test_packages_know_only_what_they_may(package):
     allowed = MAY_KNOW[package] | SUPPORT | {package, "kernels"} | {b for a, b in EXCEPTIONS if a == package}
     wrong = [

@@ -15,6 +15,7 @@ from tests.jets import jets
 
 
 @pytest.mark.parametrize(("module", "path"), derive.definitions())
+@pytest.mark.slow
 def test_files_are_what_follows_from_the_definitions(module, path):
     assert derive.derived(module) == path.read_text(encoding="utf-8"), f"run python -m {derive.__name__}"
 

@@ -270,6 +270,7 @@ def test_the_plain_mode_names_no_private_part():
     assert set(named) == own
 
 
+@pytest.mark.slow
 def test_a_private_part_is_refused(package):
     """The guard of `PROGRAM`, and of all tests in the plain mode, does refuse; numba's own modules may go on."""
     package.write("private", "def ask():\n    from numba.core import types")

@@ -87,7 +87,8 @@ def test_tests_ask_for_names_values_and_remedies_not_for_sentences(patterns):
 @pytest.mark.slow
 def test_tests_ask_for_more_than_many_messages_say(patterns):
     """A pattern that fits any refusal, as "positive" does, would be content with that of another field."""
-    texts = set().union(*(raisable(ast.parse(path.read_text(encoding="utf-8"))) for path in PACKAGE.rglob("*.py")))
+    trees = (ast.parse(path.read_text(encoding="utf-8")) for path in PACKAGE.rglob("*.py"))
+    texts = frozenset().union(*map(raisable, trees))
     assert len(texts) > 3000
     asked = {ast.unparse(node): (where, node) for where, node, _ in patterns if ast.unparse(node) != "None"}
     fits = {f"{where}: {told}": sorted(fitting(node, texts)) for told, (where, node) in asked.items()}
@@ -103,7 +104,7 @@ def check(gauge, name):
         raise ValueError(f"{name} is {gauge}; it must not be negative" + hint(name))
     raise ValueError("gauge " + f"{'is not known' if name else 'has no name'}; give a name")
 """
-    texts = raisable(ast.parse(code))
+    texts = frozenset(raisable(ast.parse(code)))
     assert texts == {"\0 is \0; it must not be negative\0", "gauge \0; give a name", "is not known", "has no name"}
     for pattern, expected in {
         "'negative'": 1,

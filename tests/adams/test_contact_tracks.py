@@ -199,6 +199,7 @@ END
 """
 
 
+@pytest.mark.slow
 def test_what_rolls_on_facets_is_remarked(tmp_path):
     """A cylinder of 48 segments leaves the round by r (1 - cos(pi/48)); an exact one and a block do not."""
     (tmp_path / "roller.obj").write_text(obj(*Cylinder(50, 200).facets()))

@@ -137,6 +137,7 @@ END
         assert uz == pytest.approx(-force * cross(q, n), abs=1e-4 * abs(force))
 
 
+@pytest.mark.slow
 def test_a_point_on_a_ring_that_turns_freely():
     """Momentum and energy, of a ring about a point beside its middle, over three analyses."""
     text = """PART/2, MASS=2, CM=20, IP=1,1,1.5, WZ=3

@@ -337,6 +337,7 @@ def test_force_on_an_impact_expression():
     assert z.min() < 0.05
 
 
+@pytest.mark.slow
 def test_motions_given_by_velocity_and_acceleration():
     """A turn at 3 cos(t) rad/s from 20 degrees, a slide at 2 t m/s^2 from rest and one with ICVEL."""
     turn = BLOCK.replace("MARKER/20,PART=2", "MARKER/20,PART=2,REULER=20D,0,0") + "JOINT/1,REVOLUTE,I=20,J=10\n"

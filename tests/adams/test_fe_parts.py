@@ -72,6 +72,7 @@ def test_a_moment_bends_it_to_a_quarter_of_a_circle():
     assert 3.0 < errors[0] / errors[1] < 5.0
 
 
+@pytest.mark.slow
 def test_torsion_and_tension():
     found = tip("GFORCE/1,I=11,JFLOAT=1,RM=1,TX=1000\\FX=1000")
     np.testing.assert_allclose(found[1], LENGTH + LENGTH * 1000 / (E * AREA), rtol=1e-7)
@@ -81,6 +82,7 @@ def test_torsion_and_tension():
     np.testing.assert_allclose(turned.request(2)[-1][1], 1000 * LENGTH / (E / 2.6 * IXX), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_distributed_loads():
     """w L^4 / 8 E I of a uniform load, 11 w L^4 / 120 E I of one that grows to the tip."""
     unit = LENGTH**4 / (E * IYY)
@@ -101,6 +103,7 @@ def test_turned_sections_and_frames():
     assert abs(by_section[2]) > 0.1
 
 
+@pytest.mark.slow
 def test_it_swings_as_the_same_beam_in_python_and_goes_on():
     gravity = "ACCGRAV/KGRAV=-9806.65"
     given = deck(gravity, spans=2, extra=",CRATIOK=1E-4")
@@ -136,6 +139,7 @@ def test_a_plane_beam_off_its_plane_is_refused():
         deck(kind="2DBEAMYZ").to_mechanism()
 
 
+@pytest.mark.slow
 def test_results_hold_the_nodes(tmp_path):
     result = run_deck(deck("GFORCE/1,I=11,JFLOAT=1,RM=1,FY=1", spans=2), parse_script("SIMULATE/STATICS\n"))
     nodes = result.nodes(2)

@@ -79,6 +79,7 @@ def test_the_file_of_a_body_in_another_folder_is_read_when_that_is_said(folder, 
     np.testing.assert_array_equal(found.request(1), beside.request(1))
 
 
+@pytest.mark.slow
 def test_a_plant_reads_from_folders_that_are_named(folder, tmp_path):
     text = DECK.format(pivot="0,90D,0").replace("MNF_FILE=bar.mnf", f"MNF_FILE={folder / 'bar.mnf'}")
     inputs = "VARIABLE/1,FUNCTION=0\nVARIABLE/2,FUNCTION=AZ(100,11)\nPINPUT/1,VARIABLES=1\nPOUTPUT/1,VARIABLES=2\n"
@@ -122,6 +123,7 @@ def test_velocity_and_acceleration_of_the_frame_are_those_of_its_place(folder):
         np.testing.assert_allclose(frame[250:-1, rate : rate + 3], found, atol=0.02 * np.abs(found).max())
 
 
+@pytest.mark.slow
 def test_an_analysis_goes_on_from_the_deformed_body(folder):
     deck = read_deck(folder / "bar.adm")
     one = run_deck(deck, parse_script("SIM/DYN,END=0.08,STEPS=8\n"))
@@ -130,6 +132,7 @@ def test_an_analysis_goes_on_from_the_deformed_body(folder):
     np.testing.assert_allclose(two.modal(1)[0][-1], one.modal(1)[0][-1], atol=1e-3 * np.abs(one.modal(1)[0]).max())
 
 
+@pytest.mark.slow
 def test_results_file_and_data_set_have_the_modal_coordinates(folder, tmp_path):
     result = run_deck(read_deck(folder / "bar.adm"), end=0.02, steps=4)
     result.write(tmp_path / "bar")
@@ -218,6 +221,7 @@ def test_the_way_that_the_refusal_of_matrices_names_leads_to_a_body(tmp_path):
 @pytest.mark.parametrize(
     ("loaded", "force", "torque"), [(101, 0.1, 0.0), (103, 0.1, 0.0), (102, 0.0, 10.0), (103, 0.0, 10.0)]
 )
+@pytest.mark.slow
 def test_markers_on_a_bent_cantilever(tmp_path, loaded, force, torque):
     """Tip deflection and slope of a clamped beam, and the moment at the clamp, by a load at either of two places."""
     bar = Shaft([ShaftSection(0.4, 0.004)], seats={"A": 0.0, "M": 0.2, "B": 0.4}, elements=16, name="bar").model()

@@ -46,6 +46,7 @@ def test_mutated_decks():
 
 
 @pytest.mark.slow
+@pytest.mark.hunt
 def test_mutated_decks_in_tens_of_thousands():
     run(40_000, 2)
 
@@ -94,6 +95,7 @@ def test_random_bytes(data):
     outcome(parse_deck, read_text(data))
 
 
+@pytest.mark.slow
 def test_long_deck_reads_in_linear_time():
     parts = [
         f"PART/{k}, MASS=1, CM={10 * k}, IP=1,1,1\nMARKER/{10 * k}, PART={k}\nMARKER/{10 * k + 1}, PART={k}, QP=1,0,0"

@@ -69,6 +69,7 @@ def test_a_ball_that_touches_or_is_near_sinks_in_until_it_is_borne(height, groun
     assert np.isclose(depth, (20.0 / 1e6) ** (1.0 / exponent), rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_ball_that_nothing_bears_has_no_equilibrium():
     box = "BOX, CORNER=3, X=100, Y=100, Z=1"
     with pytest.raises(DeckError, match=says("PART_2", "free to move")):

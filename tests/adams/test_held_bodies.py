@@ -136,6 +136,7 @@ def test_what_turns_a_point_mass_is_refused_at_its_line(given, message):
         ("MARKER/31, PART=3\nSFORCE/2, TRANSLATIONAL, I=31, J=20, FUNCTION=1\n", True),
     ],
 )
+@pytest.mark.slow
 def test_an_empty_part_rests_unless_something_acts_on_it(extra, acts):
     text = PLATE.format(extra="") + "PART/3, QG=1,2,3\n" + extra
     if acts:

@@ -74,12 +74,14 @@ def compiled_residual(time, x, xd, u, parameters, xdot):
 
 
 @pytest.mark.parametrize("routine", [residual, compiled_residual], ids=["Python", "numba"])
+@pytest.mark.slow
 def test_implicit_state_equations_are_those_of_a_linear_system(routine):
     found = run(CART + LOOP + IMPLICIT, {"GSE/1": {"deriv": routine, "output": output}})
     assert found.success
     np.testing.assert_allclose(found.request(1), run(CART + LOOP + LSE).request(1), atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_state_without_a_rate():
     """E x' = A x + B u with a singular E: x2 = 4 x1 - u1, x1' = -x1 + x2."""
 

@@ -46,6 +46,7 @@ def signal_at(monkeypatch, time, number, analysis=1):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["Ctrl-C", "kill"])
 @pytest.mark.usefixtures("keep_handlers")
+@pytest.mark.slow
 def test_an_interrupted_deck_says_where_and_keeps_what_was_computed(tmp_path, monkeypatch, number, code):
     deck = tmp_path / "pendulum.adm"
     deck.write_text(PENDULUM)

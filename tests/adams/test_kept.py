@@ -18,6 +18,7 @@ FREE = "PART/2,MASS=1,CM=20,IP=1,1,1\nMARKER/20,PART=2\nACCGRAV/KGRAV=-10\nREQUE
 """A body that falls; it has no equilibrium."""
 
 
+@pytest.mark.slow
 def test_an_error_in_a_later_command_keeps_what_ran(tmp_path):
     script = parse_script(
         "SIM/DYN, END=0.1, STEPS=10\nDEACT/ACCGRAV\nACT/ACCGRAV\nSIM/STATICS\nSIM/DYN, END=1, STEPS=2\n"
@@ -144,6 +145,7 @@ def test_message_file_tells_what_statics_found(tmp_path):
     assert "Equilibrium found in" in statics
 
 
+@pytest.mark.slow
 def test_names_and_units_in_netcdf(tmp_path):
     run_deck(parse_deck(PENDULUM), end=0.1, steps=2, out=tmp_path / "run")
     with xr.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as data:

@@ -69,6 +69,7 @@ def deck(folder, forces, loads="MATRIX/2,FILE=bar.mtx,NAME=MODLOAD", extra=""):
     return parse_deck(DECK.format(forces=forces, loads=loads, extra=extra), str(folder / "modal.adm"))
 
 
+@pytest.mark.slow
 def test_a_load_case_moves_the_bar_as_a_force_at_its_node(folder):
     scale = "0.05*STEP(TIME,0,0,0.02,1)"
     case = run_deck(deck(folder, f"{CLAMP}MFORCE/1,FLEX_BODY=1,CASE_INDEX=2,SCALE={scale}"), end=0.05, steps=25)

@@ -171,6 +171,7 @@ def test_a_force_that_follows_the_acceleration_counts_in_the_modes():
     assert linear_plant(deck).transfer(s)[:, 0] == pytest.approx(exact, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_plant(tmp_path):
     from typer.testing import CliRunner
 

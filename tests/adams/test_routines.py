@@ -53,6 +53,7 @@ EXPECTED = PULLED.format(WRITTEN)
         ("USER(0.3, 1E-2, 2)\\ROUTINE=..\\bin\\library::PULL", "pull"),
     ],
 )
+@pytest.mark.slow
 def test_a_force_by_a_routine_is_that_of_the_expression(force, name):
     expected = run(EXPECTED).request(1)
     found = run(PULLED.format(force), {name: pull})
@@ -312,6 +313,7 @@ def asked(call):
     return [call.parameters[0] * call.sysfnc("DX", 20, 1)] + [0.0] * 7
 
 
+@pytest.mark.slow
 def test_a_command_gives_a_routine_other_parameters():
     """The first analysis is not to be seen with those of the second: commands are gone through before the run."""
     force = PULLED + "\nREQUEST/2, FUNCTION=USER(1)"

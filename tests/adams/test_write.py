@@ -253,6 +253,7 @@ def test_long_arguments_are_broken_after_operators():
     assert not numbers[0].endswith(",")
 
 
+@pytest.mark.slow
 def test_files_of_a_run_can_be_read_back(tmp_path):
     result = run_deck(parse_deck(PENDULUM), end=1.0, steps=10, out=tmp_path / "out")
     times, requests = read_requests((tmp_path / "out.req").read_text())

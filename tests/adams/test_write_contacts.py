@@ -158,6 +158,7 @@ def test_gears_of_a_deck_that_start_deep_in_each_other_are_refused(tmp_path):
         read_deck(tmp_path / "g.adm").to_mechanism().simulate(1e-4)
 
 
+@pytest.mark.slow
 def test_the_meshes_touch_where_the_teeth_do(tmp_path):
     """Without the comments the deck is what other programs have: two meshes that press each other apart."""
     m = rig(PAIRS["plain"])

@@ -89,6 +89,7 @@ def test_damping_of_each_mode_is_an_expression():
     assert damping_text(ratios[:2]) == "0.01"
 
 
+@pytest.mark.slow
 def test_what_no_neutral_file_holds_is_named(tmp_path):
     m, body = running(SHAFT.modal_model().slowest(6), "full")
     with pytest.raises(ModelError, match=says("path", "give the deck's")):

@@ -65,6 +65,7 @@ def test_every_kind_is_tried():
 
 
 @pytest.mark.parametrize("kind", ELEMENTS)
+@pytest.mark.slow
 def test_files_hold_every_kind_of_element(kind, tmp_path):
     result = run_deck(parse_deck(model(PARTS + ELEMENTS[kind])), end=0.02, steps=2, out=tmp_path / "run")
     assert result.success, result.messages

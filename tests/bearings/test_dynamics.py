@@ -58,6 +58,7 @@ def line_near(values: np.ndarray, rate: float, expected: float) -> float:
         ({"defects": ALL, "rolling_friction": 1e-3}, 1e-6),
     ],
 )
+@pytest.mark.slow
 def test_energy(settings, limit):
     m = bearing_rig(DEEP.changed(clearance="5 um"), speed=SPEED, radial_load=400.0, axial_load=30.0, **settings)
     solution = m.simulate(0.03, rate=500000, tol=1e-10)
@@ -69,6 +70,7 @@ def test_energy(settings, limit):
         assert float(balance.dissipated_friction[-1]) > 0.0
 
 
+@pytest.mark.slow
 def test_cage_turns_as_ideal_rolling_says():
     for slip in (0.0, 0.012):
         solution = bearing_rig(DEEP, speed=SPEED, cage_slip=slip).simulate(0.2, rate=2000, tol=1e-8)

@@ -273,6 +273,7 @@ def test_sizes_of_signals(name, size, words):
     assert FunctionSubject(nested, {"x": 1.0}, signals={"w 1.a": (4, "1 kHz")}).signal_sizes == {"w 1.a": (4, 1000.0)}
 
 
+@pytest.mark.slow
 def test_units_of_another_campaign_are_none_of_this_one(tmp_path):
     """Ledger and table that were copied from a campaign with another seed agree with each other."""
     mine, other = (small(tmp_path / name, seed=k) for k, name in enumerate(("a", "b")))

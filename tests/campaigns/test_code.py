@@ -178,6 +178,7 @@ def test_what_the_processor_depends_on(tmp_path, monkeypatch):
     assert processor_lines() == []
 
 
+@pytest.mark.slow
 def test_an_edit_in_the_middle_is_refused_by_name(modules, tmp_path, monkeypatch):
     """Refused; gone on with if that is told, which is then told; or done again."""
     campaign = made(modules, tmp_path / "c")
@@ -202,6 +203,7 @@ def test_an_edit_in_the_middle_is_refused_by_name(modules, tmp_path, monkeypatch
         campaign.run(workers=0, other_code="all")
 
 
+@pytest.mark.slow
 def test_what_the_driver_cannot_look_at_is_told_in_a_line(modules, tmp_path, monkeypatch):
     """A source that was edited since the first look, is no Python, or is gone; once it is as it was, it runs."""
     campaign = made(modules, tmp_path / "c")
@@ -226,6 +228,7 @@ def test_what_the_driver_cannot_look_at_is_told_in_a_line(modules, tmp_path, mon
     assert campaign.run(workers=0).done == 8
 
 
+@pytest.mark.slow
 def test_results_of_other_code_are_not_taken_over(modules, tmp_path, monkeypatch):
     made(modules, tmp_path / "first").run(workers=0)
     assert made(modules, tmp_path / "second", reuse=[str(tmp_path / "first")]).run(workers=0).reused == 8
@@ -257,6 +260,7 @@ def test_an_edit_under_a_worker_makes_it_refuse(modules, tmp_path, monkeypatch):
     assert running_code([*campaign.plan.subject.modules()]).sources
 
 
+@pytest.mark.slow
 def test_a_unit_under_which_a_source_is_edited_is_not_done(modules, tmp_path, monkeypatch):
     """However short ago the sources were looked at when it began."""
     campaign = made(modules, tmp_path / "c")
@@ -360,6 +364,7 @@ def test_what_is_loaded_is_held_against_its_source(tmp_path, monkeypatch, old, n
 
 
 @pytest.mark.parametrize("named", [True, False])
+@pytest.mark.slow
 def test_an_edit_after_the_import_is_refused_in_one_process(modules, tmp_path, named):
     """Also of what two campaigns of it have in common; what is loaded as it stands there runs."""
     first = made(modules, tmp_path / "first")

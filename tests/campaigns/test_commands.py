@@ -62,6 +62,7 @@ def test_errors_are_one_line(tmp_path):
     assert "no such parameter" in call("plan", tmp_path / "p.toml", code=1)
 
 
+@pytest.mark.slow
 def test_the_path_of_a_recording(tmp_path):
     x, y = np.random.default_rng(0).standard_normal((2, 1 << 14))
     heard = ss.lfilter([1.0], [1.0, -1.2, 0.97], x) + ss.lfilter([1.0], [1.0, 0.8, 0.97], y)

@@ -432,6 +432,7 @@ def test_from_recordings_to_others():
         from_recordings_to_recordings(x[20:], labels[20:], groups[20:])
 
 
+@pytest.mark.slow
 def test_plans_of_all_gearboxes_have_margins_and_all_specimens():
     layers = SensorLayers()
     for name in GEARBOXES:
@@ -449,6 +450,7 @@ def test_plans_of_all_gearboxes_have_margins_and_all_specimens():
         data_set_plan(48, gearbox=wrong, specimens=2)
 
 
+@pytest.mark.slow
 def test_gearboxes_of_one_file_have_their_own_names_and_the_same_individuals():
     """Dealt out apart, one individual would be in training under the one name and in the test under the other."""
 

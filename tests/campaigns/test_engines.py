@@ -59,6 +59,7 @@ def test_kills_of_driver_and_workers(tmp_path, undisturbed):
     assert digest(campaign) == undisturbed
 
 
+@pytest.mark.slow
 def test_time_is_limited_in_threads_that_have_no_timer():
     found: list[str] = []
 

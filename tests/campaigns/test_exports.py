@@ -99,6 +99,7 @@ def nothing(x: float) -> dict[str, float]:
     return {"": x}
 
 
+@pytest.mark.slow
 def test_nothing_is_exported_where_nothing_is_done(tmp_path):
     subject = FunctionSubject(nothing, {"x": 0.0})
     campaign = Campaign(tmp_path / "c", make_plan(subject, Factor("x", 0.0, 1.0), n=4))

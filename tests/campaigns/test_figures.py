@@ -216,6 +216,7 @@ def never(x1: float, x2: float, x3: float) -> dict:
     raise ValueError("x1: no such thing")
 
 
+@pytest.mark.slow
 def test_what_there_is_nothing_of_is_told(tmp_path):
     """A single case, of which one factor may be named; and cases that all failed."""
     one = Campaign(tmp_path / "one", make_plan(function("several"), ranges(), n=1))

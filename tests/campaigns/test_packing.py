@@ -75,6 +75,7 @@ def test_records_are_found_after_packing(tmp_path):
     np.testing.assert_array_equal(campaign.pack(4).record(2).wave.values, wave)
 
 
+@pytest.mark.slow
 def test_a_handle_from_before_is_that_of_what_is_there_now(tmp_path):
     """Packed or extended by another one: nothing is lost, and signals yet to be read are not taken for damaged."""
     before = done(tmp_path / "c")
@@ -91,6 +92,7 @@ def test_a_handle_from_before_is_that_of_what_is_there_now(tmp_path):
     assert before.open().wave.load().shape[0] == 9
 
 
+@pytest.mark.slow
 def test_what_cannot_be_packed_is_told(tmp_path):
     campaign = small(tmp_path / "c", n=8, unit=2)
     with pytest.raises(CampaignError, match=says("pack", "4 units", "run it")):
@@ -121,6 +123,7 @@ def without_ranges(path) -> Campaign:
     return campaign
 
 
+@pytest.mark.slow
 def test_columns_that_are_empty_in_some_rows(tmp_path):
     campaign = without_ranges(tmp_path / "c")
     before = campaign.table.drop(columns=["unit", "slot"])

@@ -99,6 +99,7 @@ END
 """
 
 
+@pytest.mark.slow
 def test_a_deck_with_parameters(tmp_path):
     """The mass turns round half a period after its start, on the other side of the relaxed spring."""
     deck = DECK.replace("I=2, J=4", "I=5, J=4")
@@ -139,6 +140,7 @@ def test_impossible_values_of_a_deck_come_before_any_case(tmp_path):
         Campaign(tmp_path / "c", plan)
 
 
+@pytest.mark.slow
 def test_a_deck_in_a_plans_file(tmp_path):
     """The deck, its script and its routines stand beside the plan; what is not supported is left out."""
     deck = DECK.replace("I=2, J=4", "I=5, J=4").replace(
@@ -203,6 +205,7 @@ def test_files_that_a_deck_names_count(tmp_path):
     assert subject.files() == files
 
 
+@pytest.mark.slow
 def test_files_that_changed_after_cases_were_done_are_refused(tmp_path):
     """Cases before and behind an edit of what a script reads are of two models; put back, or done again, they run."""
     commands = tmp_path / "more.acf"

@@ -459,6 +459,7 @@ def test_columns_whose_names_matlab_tells_apart_keep_them(tmp_path):
     assert {"y", "x1", "wave"} <= set(loadmat(mat))
 
 
+@pytest.mark.slow
 def test_a_fraction_names_what_it_cannot_tell(tmp_path):
     """With C = AB the effect of each is that of the product of the others besides."""
     factors = [Factor(name, -1.0, 1.0) for name in PLACES]
@@ -522,6 +523,7 @@ def test_a_surface_of_a_few_values_goes_by_them(tmp_path, design):
                 campaign.response_surface("s", 1)
 
 
+@pytest.mark.slow
 def test_a_surface_of_whole_numbers_goes_by_their_values(tmp_path):
     factors = [Factor("a", 1, 6, whole=True), Factor("b", 1.0, 3.0)]
     plan = make_plan(FunctionSubject(adding, {"a": 1.0, "b": 2.0}), factors, n=32)

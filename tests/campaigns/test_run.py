@@ -194,6 +194,7 @@ def test_claims_of_the_dead_are_taken_over(tmp_path, undisturbed):
     assert not claim.exists()
 
 
+@pytest.mark.slow
 def test_damage_is_found_and_mended(tmp_path, undisturbed):
     campaign = small(tmp_path / "c")
     campaign.run(workers=0)
@@ -242,6 +243,7 @@ def test_crossed_choices_run(tmp_path):
     assert campaign.case(1)["x3"] == 2.0
 
 
+@pytest.mark.slow
 def test_columns_and_conditions(tmp_path):
     """As of the whole table, whatever is read; names with dots are also found with underscores."""
     campaign = small(tmp_path / "c")
@@ -271,6 +273,7 @@ def test_results_that_are_no_numbers_are_counted(tmp_path):
     assert "1 with results that are no numbers" in str(status)
 
 
+@pytest.mark.slow
 def test_a_case_that_sleeps_is_ended_by_the_clock(tmp_path):
     """Also one that goes on whatever interrupts it; its processor time is told wherever it was spent."""
     campaign = moody(tmp_path, wall_limit=0.2, asleep=1, deaf=1)
@@ -381,6 +384,7 @@ def louder(x: float) -> dict:
     return {"y": x, "wave": x * np.arange(1.0, 5.0)}
 
 
+@pytest.mark.slow
 def test_signals_that_do_not_fit_are_not_taken_over(tmp_path):
     """One that would be longer than planned, or of another rate, is simulated, and found wrong there."""
 
@@ -439,6 +443,7 @@ def test_reuse_counts_what_is_no_number(tmp_path, function):
     np.testing.assert_array_equal(second.open().wave, first.open().wave)
 
 
+@pytest.mark.slow
 def test_what_is_taken_over_is_looked_for_anew(tmp_path):
     """In a folder made anew, which keeps something else; equal cases of a unit are equal to the last bit."""
     rows = [{"x": x} for x in (1.0, 1.0 + 1e-13, 1.0)]

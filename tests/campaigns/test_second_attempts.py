@@ -74,6 +74,7 @@ def with_ledger(made, unit=0, **entries):
     ledger.write_text(sealed({name: value for name, value in entry.items() if value is not None}))
 
 
+@pytest.mark.slow
 def test_the_record_is_that_of_the_attempt_that_was_done(tmp_path):
     made = campaign(tmp_path / "a", unit=2)
     assert made.table["status"].tolist() == ["done", "done", "failed", "done"]
@@ -116,6 +117,7 @@ def test_a_record_that_is_a_failed_attempts_is_noticed_and_done_again(tmp_path):
 
 @pytest.mark.parametrize("old", [False, True])
 @pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.slow
 def test_results_at_another_tolerance_are_those_of_plans_that_ask_for_it(tmp_path, old, packed):
     source = campaign(tmp_path / "a", keep=["numbers"], unit=2)
     if old:

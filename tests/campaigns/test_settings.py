@@ -108,6 +108,7 @@ def spring(spring: dict, m: float = 1.0) -> dict:
     return {"k": spring["k"], "words": float(len(spring.get("names", ())))}
 
 
+@pytest.mark.slow
 def test_tables_of_functions_have_ranges_with_units(tmp_path):
     choice = choose("spring", soft={"k": ("1 N/mm", "2 N/mm"), "names": ["x", "y"]}, stiff={"k": ("3 N/mm", "4 N/mm")})
     parameters = {"spring": {"k": 1.0}}
@@ -247,6 +248,7 @@ def test_what_is_made_of_a_part_says_so(tmp_path):
         assert "left out" not in condition_figure(campaign, "y > 0", "x1", "x2", 2).axes[0].get_title()
 
 
+@pytest.mark.slow
 def test_results_that_are_no_numbers_are_left_out_of_maps_and_figures(tmp_path):
     """Neither a condition about them holds nor its opposite; what tells of other columns has all cases."""
     campaign = small(tmp_path / "c", "silent", keep=["numbers"], unit=64)

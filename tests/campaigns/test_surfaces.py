@@ -24,6 +24,7 @@ RANGE = Factor("z", 0.0, 1.0)
     Factor("kind", values=["a", "b"]),
     Choice("kind", {"one": "a", "other": "b"}),
 ])  # fmt: skip
+@pytest.mark.slow
 def test_predictions_at_points_of_the_plan(tmp_path, factor):
     campaign = Campaign(tmp_path / "c", make_plan(SUBJECT, [factor, RANGE], "sobol", n=32, keep=["numbers"]))
     campaign.run(workers=0)

@@ -112,6 +112,7 @@ def test_what_a_base_does_not_tell_is_refused():
     ('speed = "1785 rpm"', 'speed = "29.75 Hz"'),
     ("stiffness = 5.876e+07", 'stiffness = "5.876e7 N/m"'),
 ])  # fmt: skip
+@pytest.mark.slow
 def test_the_file_of_a_data_set_in_other_units(tmp_path, old, new):
     text = GEARBOXES["two stages"].file.read_text()
     assert old in text

@@ -44,6 +44,7 @@ def largest_error(exact, near):
 
 
 @pytest.mark.parametrize(("law", "load", "faults"), list(product(LAWS, ("slices", "adams"), FAULTS)))
+@pytest.mark.slow
 def test_derivatives(law, load, faults):
     checked = 0
     for number, (friction, tilt) in enumerate(product(FRICTIONS, TILTS)):

@@ -353,6 +353,7 @@ def test_friction_on_tip_corners(name):
 
 
 @pytest.mark.parametrize(("helix", "slices"), [("0 deg", 1), ("0 deg", 5), ("15 deg", 9)])
+@pytest.mark.slow
 def test_derivatives_where_a_corner_leaves_the_tip_of_its_mate(helix, slices):
     # tips pass 20 and 35 um apart, so that corners 60 um deep leave the ring's flank over its edge
     one, ring = GearSpec(23, "3 mm", helix_angle=helix), GearSpec.ring(70, "3 mm", addendum="2 mm", helix_angle=helix)

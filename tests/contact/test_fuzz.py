@@ -30,6 +30,7 @@ def test_other_kinds_of_wheels(kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("slices", [1, 11])
+@pytest.mark.hunt
 def test_a_million(slices):
     run(GearPair.paper(), slices, 1_000_000)
 

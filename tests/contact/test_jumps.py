@@ -188,6 +188,7 @@ def test_no_jumps(name):
 
 
 @pytest.mark.slow
+@pytest.mark.hunt
 @pytest.mark.parametrize("name", PERFECT)
 def test_no_jumps_on_many_paths(name):
     pair, slices = PERFECT[name]

@@ -25,6 +25,7 @@ def position(solution):
     return solution.com_position("mass")[:, 0]
 
 
+@pytest.mark.slow
 def test_a_linear_oscillator_has_the_derivatives_of_its_frequency_response():
     """c = A / (k - m w^2 + i d w)."""
 
@@ -41,6 +42,7 @@ def test_a_linear_oscillator_has_the_derivatives_of_its_frequency_response():
     assert found.motion.stable
 
 
+@pytest.mark.slow
 def test_a_duffing_oscillator_moves_as_by_an_independent_shooting():
     found = gm.steady_sensitivities(
         lambda amplitude: slide(f"{amplitude!r}*COS(1.2*TIME)-0.1*VX(I,J)-DX(I,J)-DX(I,J)**3"),
@@ -61,6 +63,7 @@ def test_a_duffing_oscillator_moves_as_by_an_independent_shooting():
     assert by == pytest.approx(wanted, rel=1e-4, abs=1e-4 * np.abs(wanted).max())
 
 
+@pytest.mark.slow
 def test_a_length_that_moves_the_start_along_its_constraints():
     """A pendulum that a torque swings: where its body starts follows from the length at each angle."""
 

@@ -102,6 +102,7 @@ def test_where_an_orbit_is_unstable_it_is_told_and_still_found_when_asked_for():
     assert found.multipliers[0].real == pytest.approx(np.exp(root), rel=3e-3)
 
 
+@pytest.mark.slow
 def test_an_orbit_that_has_doubled_its_period_is_found_with_the_doubled_one():
     # Duffing with a soft well: the symmetric swing about one side has doubled its period at 0.29
     force = "0.29*COS(TIME)-0.5*VX(I,J)+DX(I,J)-DX(I,J)**3"
@@ -135,6 +136,7 @@ def test_what_differs_between_the_ends_of_a_period_is_seen():
 
 
 @pytest.mark.parametrize("attracting", [True, False])
+@pytest.mark.slow
 def test_where_equations_jump_at_a_state_multipliers_are_not_known(attracting):
     """The jump is looked for in the orbit that was found; one with a width, and one out of reach, have multipliers."""
     settings = {"tol": 1e-8, "attracting": attracting}

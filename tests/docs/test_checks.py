@@ -24,6 +24,7 @@ def scripts():
 
 
 @pytest.mark.parametrize(("group", "bound"), [("geometry", 1e-12), ("statics", 5e-4), ("mechanics", 1e-6)])
+@pytest.mark.slow
 def test_rows_agree(scripts, group, bound):
     import checks
 

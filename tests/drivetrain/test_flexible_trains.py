@@ -333,6 +333,7 @@ speed = "1500 rpm"
 """
 
 
+@pytest.mark.slow
 def test_a_file_says_the_same_with_parts_in_tables_of_their_shafts(tmp_path):
     block = solid_model(block_mesh(("200 mm", "100 mm", "240 mm"), (2, 2, 3)), quadratic=False)
     model = reduce_model(block, [Interface("all", block.ids[::5].tolist(), "average")], modes=8)

@@ -228,6 +228,7 @@ def test_chain_of_tilted_wheels_without_load_is_warned_of():
                                settings={"backlash": "0.6 mm", "misalignment": "0.2 deg"})])  # fmt: skip
 
 
+@pytest.mark.slow
 def test_overdamped_meshes_are_warned_of():
     hard = ContactLaw.linear("3e8 N/m", "1e5 N*s/m", "2 um")
     for contact in (ContactLaw.impact(depth="0.01 mm"), ContactLaw.impact(), hard):

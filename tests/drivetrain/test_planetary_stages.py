@@ -790,6 +790,7 @@ def differential(drives, duration, settling=0.01, **more):
     return train, run_train(train, RunSettings(settling=settling, duration=duration))
 
 
+@pytest.mark.slow
 def test_a_stage_that_turns_as_a_block_has_signals_and_lines_of_shafts():
     drives = [SpeedDrive(name=f"on {n}", shaft=n, speed="1000 rpm") for n in ("sun", "ring")]
     train, record = differential(drives, 0.02)

@@ -223,6 +223,7 @@ def drift(train: Drivetrain) -> float:
     return float(abs(speed[-1] / speed[0] - 1.0))
 
 
+@pytest.mark.slow
 def test_a_running_train_whose_torques_do_not_begin_together_is_told_of():
     """A number comes on over the run-up, an input acts from the start; of one kind only flank friction slows it."""
     drive, brake = make_input("drive", "N m", 100.0), make_input("braking", "N m", 300.0)

@@ -146,6 +146,7 @@ def test_princeton_beam(force, row):
 
 
 @pytest.mark.parametrize(("angle", "published"), [(30, (0.0169316, 0.1179818)), (60, (0.0118996, 0.1817173))])
+@pytest.mark.slow
 def test_princeton_beam_with_the_torsion_constant_of_another_program(angle, published):
     """Exudyn's own beams (16 elements, 13.345 N) with its constant 0.198 (I_y + I_z): 9 % less than that of ANSYS.
 
@@ -241,6 +242,7 @@ def spun_modes(spin, coupling="full"):
     return m, tip
 
 
+@pytest.mark.slow
 def test_spin_up_of_a_modal_body_needs_its_stiffening():
     m, tip = spun_modes("root")
     with warnings.catch_warnings():
@@ -362,6 +364,7 @@ def test_shares_of_the_nodes_carry_mass_centre_and_inertia(elements):
         assert shares @ places**power == pytest.approx(exact, rel=1e-12), power
 
 
+@pytest.mark.slow
 def test_bending_frequencies_of_a_chain_converge_like_h_to_the_fourth():
     """Clamped and free: against the roots of cosh x cos x = -+1 of a slender bar."""
     section = BeamSection.ring(ElasticMaterial(), 0.004)

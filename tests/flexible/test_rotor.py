@@ -121,6 +121,7 @@ def test_unequal_bearings_give_planar_modes_at_rest_and_backward_orbits_between_
     assert (np.conj(shape[0]) * shape[1]).imag > 0
 
 
+@pytest.mark.slow
 def test_campbell_table():
     table = friswell().campbell([0.0, "2000 rpm", "4000 rpm"], 4)
     assert table.frequencies.shape == (3, 4)
@@ -131,6 +132,7 @@ def test_campbell_table():
     assert repr(table).splitlines()[3].split()[:3] == ["4000", "13.5901", "b"]
 
 
+@pytest.mark.slow
 def test_masses_of_sections_cones_and_discs():
     tube = Shaft(
         [ShaftSection("0.3 m", "60 mm", "20 mm"), ShaftSection(0.2, 0.06, 0.02, outer_end=0.03, inner_end=0.02)],

@@ -65,6 +65,7 @@ def test_a_shaft_whirls_as_a_rotor_with_all_degrees_of_freedom(rpm, turn):
         np.testing.assert_allclose(found[1] - found[0], exact[1] - exact[0], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_damping_inside_a_shaft_drives_it_above_its_critical_speed():
     """What turns with the shaft damps it below the frequency of its forward whirl and drives it above."""
     rotor = Rotor(SHAFT, [Support("left", "1 kN/mm"), Support("right", "1 kN/mm")])

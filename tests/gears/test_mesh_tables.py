@@ -29,6 +29,7 @@ def between(table, load):
 
 @pytest.mark.parametrize("rotation", [1, -1])
 @pytest.mark.parametrize("internal", [False, True])
+@pytest.mark.slow
 def test_the_table_of_forces_is_the_inverse_of_the_transmission_error(internal, rotation):
     """Under a torque that is not among those of the table the deflection is that of the search."""
     geared = pair(internal, rotation=rotation)
@@ -121,6 +122,7 @@ def test_files_hold_the_tables(tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_the_component_does_the_work_of_its_potential():
     """The force over the deflection is that of a stored energy, which is none without contact and that of before again
     after a mesh."""

@@ -34,6 +34,7 @@ def test_shares_of_a_tooth_and_the_next_add_up(rotation):
     assert total == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_skew_loads_the_ends_of_the_face():
     pair = GearPair.paper(misalignment="1 deg", contact=ContactLaw.impact())
     drive, back = contact_pattern(pair, 100.0), contact_pattern(pair, 100.0, side="coast")

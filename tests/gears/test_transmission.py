@@ -23,6 +23,7 @@ UM = 1e-6
         (3e-3, 25.489, 8.61, [2.048, 1.850, 1.552, 1.197, 0.831]),
     ],
 )
+@pytest.mark.slow
 def test_loaded_tables(error, mean, peak_to_peak, harmonics):
     # K delta^1.3 per pair, corner contact, true moment arms, 100 N m
     te = loaded_transmission_error(GearPair.paper(centre_distance_error=error), 100.0)
@@ -82,6 +83,7 @@ def test_faults_out_of_sight_are_told(rotation, wheel):
         loaded_transmission_error(faulty, 20.0, 8, cycles=0)
 
 
+@pytest.mark.slow
 def test_mesh_harmonics_of_a_whole_turn():
     pair = GearPair.paper(centre_distance_error="3 mm")
     one, turn = (kinematic_transmission_error(pair, 40, cycles=n) for n in (1, 29))

@@ -146,6 +146,7 @@ def test_a_longer_pulse_on_what_is_at_rest_is_seen(kind, integrator):
 
 @pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF", "IDA"])
 @pytest.mark.parametrize("speed", [100.0, -150.0])
+@pytest.mark.slow
 def test_a_prescribed_angle_whose_speed_jumps_gains_no_turns(integrator, speed):
     """Behind the last jump the angle stands still; by the speed before it a long step would be 16 turns and more."""
     m = Mechanism("disc")

@@ -120,6 +120,7 @@ def test_separate_solids_of_a_mesh_bear_loads_of_their_own_and_cavities_do_not()
     assert [numbers for numbers, _, _ in contact.pairs()] == [(0, 0), (1, 0), (1, 0)]
 
 
+@pytest.mark.slow
 def test_no_vertex_below_is_passed_over():
     """A ball of 1154 facets' corners, anywhere about a block: depths by going through them all."""
     rng = np.random.default_rng(5)

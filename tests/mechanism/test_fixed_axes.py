@@ -153,6 +153,7 @@ def test_states_and_counted_angles():
 
 @pytest.mark.parametrize("setting", [{}, {"misalignment": "1 deg"}, {"centre_distance_error": "3 mm"}], ids=str)
 @pytest.mark.parametrize("torque", ["100 N m", "200 N m"])
+@pytest.mark.slow
 def test_gear_cases(setting, torque):
     """At the states of the reduced run all bodies' own equations give the same reactions and accelerations."""
     case = Case(operation={"duration": 0.002, "torque": torque}, fault=setting, solver={"lump": True})
@@ -307,6 +308,7 @@ def test_a_motion_about_another_axis_keeps_six_coordinates():
 
 @pytest.mark.parametrize("level", ["displacement", "velocity", "acceleration"])
 @pytest.mark.parametrize("apart", [0.4, np.pi - 0.2, np.pi + 0.9])
+@pytest.mark.slow
 def test_a_motion_whose_x_axes_start_apart(apart, level):
     """Beyond a quarter of a turn the motion holds them opposite; torque and power of the drive are then the same."""
 

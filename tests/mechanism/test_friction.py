@@ -171,6 +171,7 @@ def test_friction_torque_has_a_limit(kind):
     np.testing.assert_allclose(solution.angular_velocity("ball"), (4.0 - 0.5 * solution.t)[:, None] * axis, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_static_analyses_warn_of_friction():
     """A block held by friction alone has no equilibrium without; one that friction holds already stays."""
     held = block(0.4)

@@ -121,6 +121,7 @@ def chain_on_ground() -> Mechanism:
     return m
 
 
+@pytest.mark.slow
 def test_bodies_fixed_to_the_ground_are_ground():
     lump, full = chain_on_ground().simulate(1.0, lump=True, **TIGHT), chain_on_ground().simulate(1.0, **TIGHT)
     model = lumped(chain_on_ground())

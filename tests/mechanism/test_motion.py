@@ -38,6 +38,7 @@ def test_free_fall_and_spin():
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.slow
 def test_tumbling_body_keeps_energy_and_angular_momentum(integrator):
     """Intermediate-axis tumbling crosses the Euler singularity again and again; A J A^T w is constant."""
     moments = np.diag([1.0, 2.0, 3.0])

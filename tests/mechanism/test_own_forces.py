@@ -142,6 +142,7 @@ def test_magnet_keeps_to_keplers_orbit(formulation, integrator, derivatives):
 
 @pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
 @pytest.mark.parametrize("formulation", ["SI2", "SI1", "I3"])
+@pytest.mark.slow
 def test_maxwell_element_creeps(formulation, integrator):
     """m x'' = f0 - k (x - z), c z' = k (x - z): linear, by its matrix exponential; energy goes into the dashpot."""
     mass, k, c, pull = 2.0, 300.0, 15.0, 4.0
@@ -258,6 +259,7 @@ def tilted(name: str) -> Mechanism:
 
 @pytest.mark.parametrize("formulation", ["SI2", "SI1", "I3"])
 @pytest.mark.parametrize("name", ["magnet", "exact magnet", "maxwell", "hardening", "drag", "lever"])
+@pytest.mark.slow
 def test_jacobian_equals_differences_of_the_residual(name, formulation):
     from gearmbs.dae.equations.jacobian import jacobian
     from gearmbs.dae.equations.residual import residual

@@ -51,6 +51,7 @@ def spinning(w=20.0):
     return m, w, r + steady
 
 
+@pytest.mark.slow
 def test_where_a_body_spins_they_change_as_those_of_states_beside():
     """Against outputs of states with another deflection and rate, and -w^2 r, 2 w r' of a frame that turns."""
     m, w, reach = spinning()

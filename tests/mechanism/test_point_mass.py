@@ -325,6 +325,7 @@ def test_a_weight_between_two_springs_rests_where_their_forces_balance():
     np.testing.assert_allclose(followed.com_position("knot")[:, 0], [0, 0.05, 0.1], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_free_point_mass_without_a_balance_is_named():
     m = Mechanism("falling", gravity=(0, 0, -G))
     m.point_mass("stone", 1.0)
@@ -479,6 +480,7 @@ def _turning(t, frames, states, parameters, wrench, rates, diagnostics):
 
 
 @pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.slow
 def test_a_torque_of_ones_own_on_a_point_mass_is_told(swapped):
     """It vanished, and so did its reaction, without a word."""
     for torque in (3.0, 0.0):

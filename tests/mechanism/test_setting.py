@@ -114,6 +114,7 @@ def tumbling():
 
 
 @pytest.mark.parametrize("model", [two_discs, tumbling])
+@pytest.mark.slow
 def test_going_back_is_exact(model, tmp_path):
     """From a state taken before and after a value is set, in another simulator too, the same follows bit for bit."""
     values = np.random.default_rng(5).normal(size=60)

@@ -103,6 +103,7 @@ def test_initial_values_have_names():
     assert "R_x(disc)" in run.message
 
 
+@pytest.mark.slow
 def test_a_file_with_one_bit_turned_is_whole_or_refused(tmp_path):
     """In headers of the archive and of its arrays, too, where zip and numpy find other things to complain of."""
     sim = gm.Simulator(turning_disc(2.0), 1.0)
@@ -136,6 +137,7 @@ def sprung_disc(stiffness, torque):
     return m
 
 
+@pytest.mark.slow
 def test_what_was_set_goes_with_a_state_though_it_is_what_the_model_had():
     """Into one that has other numbers of its own; what was not set, or only after the state, is that one's."""
     sim, other = gm.Simulator(sprung_disc(3.0, 4.0), 1.0), sprung_disc(9.0, 7.0)

@@ -126,6 +126,7 @@ def test_continuations_are_exact(model, integrator, tmp_path):
 
 @pytest.mark.parametrize("records", [True, False])
 @pytest.mark.parametrize("model", [slider_crank, top])
+@pytest.mark.slow
 def test_branches_from_states_of_one_run(model, records):
     """Every state on the way, gone back to out of order and more than once, is left as the first time, bit for bit."""
     times = np.linspace(0.0, 1.0, 41)
@@ -198,6 +199,7 @@ def test_a_state_of_a_loose_run_is_gone_on_from_afresh_by_tight_ones(at, tmp_pat
 
 
 @pytest.mark.parametrize(("model", "joint"), [(slider_crank, "pin"), (top, "foot")])
+@pytest.mark.slow
 def test_a_state_of_a_loose_run_is_moved_onto_the_constraints(model, joint):
     """It leaves them open by its own tolerance: tighter runs close them, by no more, and go on with theirs."""
     state = model().simulate(1.0, tol=1e-4, dense_output=True).state_at(0.5007)
@@ -501,6 +503,7 @@ def planets():
     return planetary_mechanism(gears, speeds={"sun": 50.0}, torques={"carrier": -20.0}, run_up=0.01), {"tol": 1e-5}
 
 
+@pytest.mark.slow
 def test_planetary_set():
     m, _ = planets()
     times = np.linspace(0.0, 0.02, 41)

@@ -42,6 +42,7 @@ def rolling(formulation):
 @pytest.mark.filterwarnings("ignore:GearPair", "ignore:shaft 'in'")
 @pytest.mark.parametrize("formulation", ["SI2", "I3"])
 @pytest.mark.parametrize("model", [pair, planetary, crank, rolling])
+@pytest.mark.slow
 def test_every_name_at_a_point_is_that_of_the_solution(model, formulation):
     m, end, options = model(formulation)
     times = np.linspace(0.0, end, 42)
@@ -61,6 +62,7 @@ def test_every_name_at_a_point_is_that_of_the_solution(model, formulation):
 
 
 @pytest.mark.filterwarnings("ignore:shaft", "ignore:teeth run")
+@pytest.mark.slow
 def test_a_plant_tells_of_a_body_that_deforms_what_a_simulator_tells():
     """Its frame, and not the material at its centre, which a torque there turns the other way in the first moment."""
     m, options = flexible_pair()

@@ -57,6 +57,7 @@ def test_analysis_finds_speed_harmonics_and_sidebands():
     assert report.speed_origin == "estimated from the mesh line"
 
 
+@pytest.mark.slow
 def test_analysis_with_given_speed_and_tacho():
     omega = 2 * math.pi * 29.75
     given = analyse(record()[:, [0]], speed=omega * 1.005)
@@ -140,6 +141,7 @@ def _weak(size, seed):
 
 @pytest.mark.parametrize("speed", ["1500 rpm", "1489 rpm", "1512 rpm"])
 @pytest.mark.parametrize("size", [0.1, 0.2, 1.0])
+@pytest.mark.slow
 def test_a_speed_nearly_right_is_followed_in_noise(size, speed):
     shaft, _ = mesh_shaft(_weak(size, 1), (21,), Known(speed=speed), notes := [])
     assert "mesh line" in shaft.origin
@@ -149,6 +151,7 @@ def test_a_speed_nearly_right_is_followed_in_noise(size, speed):
 
 @pytest.mark.parametrize("speed", [1575.0, 1695.0, 1065.0])
 @pytest.mark.parametrize("size", [0.0, 0.1, 1.0])
+@pytest.mark.slow
 def test_a_wrong_speed_is_not_followed(size, speed):
     """Noise has lines anywhere, and a true mesh line has sidebands."""
     shaft, _ = mesh_shaft(_weak(size, 2), (21,), Known(speed=speed * math.pi / 30), notes := [])

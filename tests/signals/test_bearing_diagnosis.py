@@ -62,6 +62,7 @@ MESH = 3.0 * np.cos(2 * np.pi * 23 * SHAFT * TIME) * (1 + 0.4 * np.cos(2 * np.pi
     ("part", "order"), [("outer race", LINES.bpfo), ("inner race", LINES.bpfi), ("rolling element", 2 * LINES.bsf)]
 )
 @pytest.mark.parametrize("slip", [-0.009, 0.0, 0.004])
+@pytest.mark.slow
 def test_names_the_part(part, order, slip):
     modulation = 0.6 if part == "inner race" else 0.0
     report = diagnose_bearing(record(pulses(order * SHAFT, slip, modulation=modulation), MESH), "6205", f"{SHAFT} Hz")
@@ -103,6 +104,7 @@ def test_a_smooth_modulation_at_the_rate_of_a_part_is_not_certain(part, depth):
     assert "No lines" not in report.verdict
 
 
+@pytest.mark.slow
 def test_blows_in_step_with_the_shaft_name_no_part():
     """Every fifth turn, as of loose parts: 18/5 turns are near an outer race's 3.585, 27/5 near an inner's 5.415."""
     report = diagnose_bearing(record(2.0 * pulses(SHAFT / 5, jitter=0.002), MESH), "6205", f"{SHAFT} Hz", shafts=[])
@@ -162,6 +164,7 @@ def test_tail_of_a_gamma_distribution():
         assert log_tail(20.0, count) == pytest.approx(gamma.logsf(20.0, count), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_bearings_with_the_same_lines_are_one():
     data = record(pulses(LINES.bpfo * SHAFT), MESH)
     report = diagnose_bearing(data, {"a": "6205", "b": "6205", "c": ("6205", 0.345)}, f"{SHAFT} Hz")
@@ -170,6 +173,7 @@ def test_bearings_with_the_same_lines_are_one():
     assert "of bearing a or b makes" in report.verdict
 
 
+@pytest.mark.slow
 def test_several_bearings_and_ratios():
     slow = 0.3
     other = bearing_lines("6206", slow)
@@ -260,6 +264,7 @@ def test_a_modulation_at_the_cages_turns_may_be_another_shafts():
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_families_of_other_causes_seldom_accuse(seed):
     """Strong families of lines at random orders: what stands out everywhere accuses nobody."""
     rng = np.random.default_rng(seed)
@@ -270,6 +275,7 @@ def test_families_of_other_causes_seldom_accuse(seed):
     assert report.fault is None
 
 
+@pytest.mark.slow
 def test_two_defects_are_both_named():
     data = record(pulses(LINES.bpfo * SHAFT), pulses(LINES.bpfi * SHAFT, modulation=0.6, seed=2), MESH)
     report = diagnose_bearing(data, "6205", f"{SHAFT} Hz")
@@ -415,6 +421,7 @@ def test_bearings_and_shafts_of_a_drivetrain(tmp_path):
         (("--bearing", "6205", "--band", "2000"), "give two frequencies"),
     ],
 )
+@pytest.mark.slow
 def test_says_what_is_wrong(tmp_path, words, message):
     from gearmbs.signals import write_signal
 

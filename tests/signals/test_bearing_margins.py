@@ -88,6 +88,7 @@ def test_where_the_shaft_turns_faster_or_slower_than_told_it_is_judged_there(par
 
 
 @pytest.mark.parametrize("share", [-0.05, -0.03, 0.03, 0.05])
+@pytest.mark.slow
 def test_without_the_shafts_line_a_wrong_speed_acquits_nobody(share):
     report = diagnose_bearing(record(pulses(LINES.bpfo * SHAFT)), "6205", rpm(share), shafts=())
     assert report.fault is None
@@ -100,6 +101,7 @@ def test_without_the_shafts_line_a_wrong_speed_acquits_nobody(share):
 
 
 @pytest.mark.parametrize("share", [-0.05, -0.03, 0.03, 0.05])
+@pytest.mark.slow
 def test_a_wrong_speed_acquits_no_cage(share):
     cage = record(3.0 * pulses(LINES.ftf * SHAFT))
     report = diagnose_bearing(cage, "6205", rpm(share), shafts=())
@@ -115,6 +117,7 @@ def test_a_wrong_speed_acquits_no_cage(share):
 @pytest.mark.parametrize("factor", [2.0, 0.5, 4.0, 0.25])
 @pytest.mark.parametrize("part", ["outer race", "inner race", "rolling element"])
 @pytest.mark.parametrize("running", [RUNNING, 0.0 * RUNNING], ids=["orders", "quiet"])
+@pytest.mark.slow
 def test_a_wrong_sampling_rate_acquits_nobody(part, factor, running):
     """Where another rate is told all lines stand elsewhere, those of the shaft and of the mesh, too."""
     heard = record(pulses(LINES.orders[part] * SHAFT, 0.002), running)
@@ -130,6 +133,7 @@ def test_a_wrong_sampling_rate_acquits_nobody(part, factor, running):
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("parts", [(), (RUNNING,), (0.3 * np.cos(2 * np.pi * 36.0 * SHAFT * TIME),)])
+@pytest.mark.slow
 def test_a_right_rate_is_not_doubted(seed, parts):
     """Of a sound bearing, among noise, orders of the shaft, and a mesh; nor another, of which nothing tells then."""
     heard = record(*parts, seed=seed)
@@ -198,6 +202,7 @@ def test_lines_in_step_with_the_shaft_name_no_part_at_any_told_speed(share):
 
 
 @pytest.mark.parametrize("share", [-0.005, 0.0, 0.005])
+@pytest.mark.slow
 def test_the_jaws_of_a_coupling_are_no_outer_race(share):
     """Three jaws, or blades, lie 1.7 % from the outer race of a 6203, within its slip if the speed is off."""
     jaws = record(pulses(3.0 * SHAFT, jitter=0.0), RUNNING)
@@ -285,6 +290,7 @@ def test_quiet_lines_accuse_nothing_unless_asked_to():
     assert diagnose_bearing(volts, "6205", rpm(0.0)).fault == "outer race"
 
 
+@pytest.mark.slow
 def test_a_level_counts_carriers_far_above_the_line():
     """A modulated carrier of 1 m/s^2 amplitude: RMS 0.71, of which the depth of a full modulation counts."""
     wave = np.sqrt(2.0) * (1.0 + np.cos(2 * np.pi * LINES.bpfo * SHAFT * TIME)) * np.cos(2 * np.pi * 4000.0 * TIME)

@@ -97,6 +97,7 @@ def test_compare_writes_bars_for_measured_states(tmp_path):
         (["analyse", "x.csv", "--shaft", "0.4"], "--bearing"),
     ],
 )
+@pytest.mark.slow
 def test_wrong_calls_end_with_one_message(tmp_path, monkeypatch, words, said):
     monkeypatch.chdir(tmp_path)
     write(tmp_path, "x.csv")
@@ -180,6 +181,7 @@ def test_a_folder_is_one_series(tmp_path):
     assert "housing.fm4" in listed.output
 
 
+@pytest.mark.slow
 def test_an_option_that_a_message_names_is_not_named_again(tmp_path):
     """A speed that the file may hold is offered with its option; where there is none, the option is all there is."""
     x = np.random.default_rng(0).standard_normal(25600)

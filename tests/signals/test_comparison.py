@@ -112,6 +112,7 @@ def test_summary_says_what_repeats_at_every_load():
     assert with_model.summary()[0] == "broken: at every load 1 x GMF rises (+6.0, +6.0 dB)."
 
 
+@pytest.mark.slow
 def test_channels_that_contradict_each_other_are_named():
     def two(a, b):
         return make_signal({"a": tone(a).values[:, 0], "b": tone(b).values[:, 0]}, RATE, speed=OMEGA, teeth=TEETH)
@@ -206,12 +207,14 @@ def test_units_must_agree():
 
 
 @pytest.mark.parametrize(("factor", "told"), [(1000.0, True), (0.01, True), (10.0, False)])
+@pytest.mark.slow
 def test_records_that_differ_as_by_a_unit_are_told(factor, told):
     report = compare({"healthy": tone(BASE["healthy"]), "misaligned": tone(BASE["misaligned"], factor)})
     assert report.summary()[0].startswith("CHECK THE UNITS") == told
 
 
 @pytest.mark.parametrize(("faster", "told"), [(1.25, True), (1.02, False)])
+@pytest.mark.slow
 def test_records_of_other_speeds_are_told(faster, told):
     worn = make_signal(
         tone((1.1, 1.5, 0.3)).values, faster * RATE, channels=["acc"], units="m/s^2", speed=faster * OMEGA, teeth=TEETH

@@ -26,6 +26,7 @@ def noise(seed=0, size=TIME.size):
 
 
 @pytest.mark.parametrize("depth", [0.3, 0.8])
+@pytest.mark.slow
 def test_correlation_of_modulated_noise(depth):
     """Of (1 + m cos) times noise of unit variance: S(0) = 2 (1 + m^2/2)/rate one-sided, and lines of m and m^2/4."""
     values = (1.0 + depth * np.cos(2 * np.pi * 40.0 * TIME)) * noise()

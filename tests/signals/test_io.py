@@ -381,6 +381,7 @@ def test_reading_reports_progress(tmp_path):
 
 
 @pytest.mark.parametrize("format", NAMES)
+@pytest.mark.slow
 def test_damage_anywhere_is_named_or_harmless(tmp_path, format):
     """Bytes cut off, taken out or changed, also in the header: a signal, or an error with the file's name."""
     rng = np.random.default_rng(17)

@@ -118,6 +118,7 @@ def test_a_sideband_within_the_tolerance_is_no_mesh_line(teeth, off):
     assert told or report.speed == pytest.approx(2 * np.pi * turns, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_hum_is_doubted_as_a_mesh_line():
     t = np.arange(3 * 12800) / 12800.0
     noise = 0.1 * np.random.default_rng(2).standard_normal(t.size)

@@ -127,6 +127,7 @@ def test_a_comparison_says_loudly_that_drop_outs_were_left(known):
         assert not any("DROP-OUTS" in note for note in compare(one, **known).notes)
 
 
+@pytest.mark.slow
 def test_an_analysis_says_that_a_range_was_exceeded():
     """Of an accelerometer, too; of a contact force that ends at zero it does not."""
     clean = add_noise(vibration(unit="m/s^2", seconds=1.0), seed=seed(7), rms=1e-5)

@@ -27,6 +27,7 @@ def machine(seconds=4.0, g=True):
     return make_signal({"housing": x}, RATE, units="g" if g else None)
 
 
+@pytest.mark.slow
 def test_levels_lines_orders_and_envelope():
     report = analyse(machine(), speed="1500 rpm")
     assert isinstance(report, VibrationReport)

@@ -96,7 +96,7 @@ def test_pulses_at_the_kinematic_orders(part):
     assert [f.part for f in report.accused] == [part]
 
 
-@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 20), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(3), range(3, 20)])
 @pytest.mark.slow
 def test_sound_records_are_not_accused(seeds):
     for seed in seeds:
@@ -161,6 +161,7 @@ def test_a_speed_is_needed():
         analyse(pulses("none", turns=10).drop_vars("angle"), planetary=(23, 31, 85))
 
 
+@pytest.mark.slow
 def test_a_backward_carrier_is_followed_too():
     signal = pulses("planet")
     phase = xr.DataArray(-signal["angle"].values, dims="time", coords={"time": signal["time"].values})

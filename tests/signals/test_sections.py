@@ -52,9 +52,7 @@ def test_texts_keep_all_digits_in_the_legacy_print_mode(tmp_path):
     np.testing.assert_array_equal(read_signal(path).values, record(1.0).values)
 
 
-@pytest.mark.parametrize(
-    "format", [pytest.param(name, marks=pytest.mark.slow) if name == "csv.gz" else name for name in NAMES]
-)
+@pytest.mark.parametrize("format", NAMES)
 @pytest.mark.slow
 def test_sections_put_together_are_the_record(tmp_path, format):
     whole = record()

@@ -34,6 +34,7 @@ POWER = {"displacement": 0, "velocity": 1, "acceleration": 2}
     phase=st.floats(-3.0, 3.0),
     offset=st.floats(-100.0, 100.0),
 )
+@pytest.mark.slow
 def test_a_sine_converts_by_powers_of_its_frequency(frequency, start, to, phase, offset):
     t = np.arange(4 * 12800) / RATE
     w = 2 * np.pi * frequency
@@ -157,6 +158,7 @@ def test_spectral_kurtosis_of_noise_tone_and_bursts():
     assert np.nanmax(found.values) > 1
 
 
+@pytest.mark.slow
 def test_kurtogram_of_noise_tone_and_bursts():
     rng = np.random.default_rng(8)
     n = 1 << 18

@@ -28,6 +28,7 @@ def test_lines_that_move_are_seen(rpm, way):
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("rpm", [1650.0, 1650 * (1 + 0.005 * np.cos(11 * PART))])
+@pytest.mark.slow
 def test_steady_lines_do_not_move(rpm, seed):
     """Nor lines that grow, nor knocks that ring down, nor noise."""
     steady = record(rpm, seed=seed)
@@ -49,6 +50,7 @@ def test_a_run_up_with_one_speed_is_told(teeth):
 
 
 @pytest.mark.parametrize(("wobble", "rate"), [(0.01, 1), (0.01, 2), (0.02, 1), (0.004, 1), (0.0, 1)])
+@pytest.mark.slow
 def test_a_speed_that_wobbles_by_more_than_is_followed_is_told(wobble, rate):
     """A wobble of 0.15 / 29 is followed; one that is not takes a part of the mesh out of the average."""
     seen = record(1500 * (1 + wobble * np.sin(2 * np.pi * rate * SECONDS * PART)))
@@ -60,6 +62,7 @@ def test_a_speed_that_wobbles_by_more_than_is_followed_is_told(wobble, rate):
 
 
 @pytest.mark.parametrize("share", [1.0, 1.02, 0.9, 2.0])
+@pytest.mark.slow
 def test_a_run_up_whose_mesh_is_elsewhere_is_told(share):
     curve = [(0.0, f"{900 * share} rpm"), (SECONDS, f"{2400 * share} rpm")]
     report = analyse(record(900 + 1500 * PART), 29, speed=curve)

@@ -139,6 +139,7 @@ def test_a_cylinder_s_side_may_be_given_otherwise(tmp_path, kind):
     assert volume(vertices, triangles) == pytest.approx(np.pi * 0.16 * 2.0, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_an_edge_that_a_ball_has_rounded(tmp_path):
     """Of it a quarter of a torus is left; where the ball touches it ends."""
     vertices, triangles = facets_of(tmp_path, rounded_cylinder(0.4, 2.0, 0.1), 1e-4)

@@ -265,6 +265,7 @@ def test_auto_is_read_written_and_resolved_by_curves():
     assert Case().tolerance == 1e-7
 
 
+@pytest.mark.slow
 def test_many_cases_take_auto_where_no_duration_is_given():
     one = PairSubject(Case()).case
     assert one.is_auto

@@ -149,6 +149,7 @@ class Studied:
         (["gearbox"], 2, "modes, Hz: 12.5, 310"),
     ],
 )
+@pytest.mark.slow
 def test_studies_as_commands(tmp_path, monkeypatch, words, runs, told):
     """Each runs what it names, writes to its folder and prints what came of it; wrong settings run nothing."""
     named, moved = [], []

@@ -36,6 +36,7 @@ def gone(pid):
     return False
 
 
+@pytest.mark.slow
 def test_results_in_order_with_progress():
     told, finished = [], {}
     results = run_jobs(
@@ -57,6 +58,7 @@ def test_results_in_order_with_progress():
         ("die", WorkerDied, says("worker process", "memory", "__name__ == '__main__'")),
     ],
 )
+@pytest.mark.slow
 def test_a_failure_ends_the_others(job, kind, words):
     """The other job would never end; its process is gone when the error arrives."""
     pids = []
@@ -65,6 +67,7 @@ def test_a_failure_ends_the_others(job, kind, words):
     assert all(gone(pid) for pid in pids)
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_is_replaced_and_jobs_are_taken_when_one_is_free():
     taken = []
 
@@ -99,6 +102,7 @@ def test_a_thread_that_ends_without_a_word_is_a_death():
     assert died.value.job == "job"
 
 
+@pytest.mark.slow
 def test_a_job_whose_worker_dies_is_tried_again_so_often():
     finished = []
     with pytest.raises(WorkerDied) as died:
@@ -146,6 +150,7 @@ def test_an_error_that_cannot_be_sent_arrives_as_text():
         run_jobs(raise_what_cannot_travel, [0], 1)
 
 
+@pytest.mark.slow
 def test_a_result_that_cannot_be_sent_is_no_death():
     with pytest.raises(RuntimeError, match=says("'case 7'", "function", "pickled", "threads")):
         run_jobs(return_what_cannot_travel, ["case 7"], 1)

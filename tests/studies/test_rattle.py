@@ -25,6 +25,7 @@ def test_the_file_is_the_transmission():
 
 
 @pytest.mark.parametrize("model", ["equivalent", "torsional", pytest.param("multibody", marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_coast_flanks_are_hit_from_the_threshold_on(model):
     """J alpha + T_D >= 0 keeps the wheel on its flank: no hit at 0.99 of T_D/J, hits at 1.01."""
     below, above = (rattle(model, RattleSettings(level=level), cycles=1) for level in (0.99, 1.01))

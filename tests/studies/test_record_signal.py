@@ -64,6 +64,7 @@ def test_record_signal_keeps_what_is_known(records):
         record_signal(records["healthy"].drop_attrs())
 
 
+@pytest.mark.slow
 def test_files_of_runs_and_measurements_are_read_alike(records, tmp_path):
     write_dataset(tmp_path / "run.nc", records["broken"])
     signal = record_signal(records["broken"], "tangential")

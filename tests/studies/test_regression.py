@@ -20,6 +20,7 @@ def levels(request):
 
 
 @pytest.mark.parametrize("case", list(STORED["levels"]))
+@pytest.mark.slow
 def test_gmf_levels(levels, case):
     for component, values in STORED["levels"][case].items():
         np.testing.assert_allclose(levels[case][component], values, rtol=1e-3, err_msg=f"{case}, {component}")

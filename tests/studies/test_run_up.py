@@ -87,6 +87,7 @@ def test_the_record_follows_the_mesh_orders(run_up):
     np.testing.assert_allclose(levels.values[k], wanted, rtol=0.25)
 
 
+@pytest.mark.slow
 def test_a_coast_down_and_a_torque_that_changes():
     case = Case(
         operation={

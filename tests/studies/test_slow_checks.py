@@ -11,6 +11,7 @@ pytestmark = pytest.mark.slow
 SHORT = {"run_up": 0.03, "settling": 0.03, "duration": 0.15}
 
 
+@pytest.mark.hunt
 def test_a_minute_of_rotation_neither_drifts_nor_loses_accuracy():
     """60 s at 1000 rpm, that is 1000 turns: constraints, driver angle and mesh force as at the start.
 

@@ -93,6 +93,7 @@ def test_a_case_and_its_mechanism_have_one_orbit():
     assert np.abs(one.multipliers) == pytest.approx(np.abs(other.multipliers), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_faulty_tooth_makes_the_period_a_turn_of_its_wheel():
     case = Case(gears={"teeth": (20, 31)}, operation={"speed": "1500 rpm"}, fault={"teeth": "broken tooth"})
     assert gm.steady(case, variables=["gmf_rms"]).period == pytest.approx(0.04)

@@ -101,6 +101,7 @@ def test_places_are_looked_at_before_the_work(tmp_path, monkeypatch):
         check_place(tmp_path, 1e3)
 
 
+@pytest.mark.slow
 def test_the_size_of_a_record_is_foreseen(tmp_path):
     case = Case(operation=SHORT)
     size = write_dataset(tmp_path / "r.nc", run_case(case)).stat().st_size
@@ -164,6 +165,7 @@ def test_two_calls_share_the_cases(tmp_path, monkeypatch):
     assert computed[2:] == ["mine"]
 
 
+@pytest.mark.slow
 def test_errors_can_be_kept(tmp_path, monkeypatch):
     """The case whose record is too short, the one that fails, and the sound one, each in its place."""
     monkeypatch.setattr(

@@ -35,6 +35,7 @@ def test_three_groups_of_three_bars_of_the_right_height(table):
 
 
 @pytest.mark.parametrize("log", [False, True])
+@pytest.mark.slow
 def test_bars_are_readable(table, log):
     assert_readable(gmf_bars(table, title="Model, low load (100 N m): RMS of the GMF harmonics", log=log))
 

@@ -62,6 +62,7 @@ def test_static_motion_carries_the_load():
     assert angle[1] - angle[0] == pytest.approx(2 * np.pi / 29 / 5)
 
 
+@pytest.mark.slow
 def test_mesh_view_draws_teeth_contacts_and_forces():
     pair = GearPair.paper(backlash="0.1 mm")
     figure = mesh_view(pair, title="Healthy pair, 100 N m")

@@ -41,6 +41,7 @@ def four_bar():
     ],
     ids=["wheel", "ring", "helical wheel", "pair", "four bar", "rig", "case"],
 )
+@pytest.mark.slow
 def test_things_draw_themselves(thing):
     figure = thing.plot()
     assert isinstance(figure, Figure)

@@ -44,6 +44,7 @@ def test_a_simulated_set_moves(gears):
     assert np.abs(carrier.axes[-1] - carrier.axes[0]).max() > 0.01
 
 
+@pytest.mark.slow
 def test_a_figure_needs_a_channel_of_the_report():
     report = diagnose_planetary(PlanetaryModel((23, 31, 85)).signal(10.0, 500.0, 1.0), (23, 31, 85), "60 rpm")
     assert len(planetary_plot(report).axes) == 3

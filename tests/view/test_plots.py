@@ -69,6 +69,7 @@ def test_order_plot_marks_the_mesh_orders(signal):
     assert_readable(figure)
 
 
+@pytest.mark.slow
 def test_averages_share_their_axes_and_count_teeth(signal):
     phase = signals.phase_from_speed(signal, signal.attrs["speed"])
     average = signals.time_synchronous_average(signal, phase)[:, [0]]
@@ -229,6 +230,7 @@ def test_map_names_axes_in_drawing_units_and_marks_failed_runs(ratios):
     assert left.collections[0].norm(1.0) == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_map_axes_can_be_exchanged(ratios):
     figure = sensitivity_map(ratios[0], x="depth", title="one plane")
     assert figure.axes[0].get_xlabel() == "penetration depth d, mm"
@@ -276,6 +278,7 @@ def test_transmission_error_and_stiffness_over_cycles(pair):
         stiffness_plot({})
 
 
+@pytest.mark.slow
 def test_long_names_of_curves_stay_in_the_figure(pair):
     error = loaded_transmission_error(pair, torque=100.0)
     names = {f"centre distance +{k} mm, contact ratio 1.{k}4": error for k in range(3)}

@@ -100,6 +100,7 @@ def test_scene_of_a_pair_shows_the_misalignment(scene):
     assert np.linalg.norm(scene.forces[0][:, 1], axis=1).sum() > 2390.0
 
 
+@pytest.mark.slow
 def test_still_picture_is_readable(scene):
     figure = scene.still(dpi=60)
     assert_readable(figure)
@@ -188,6 +189,7 @@ def test_wrong_scenes_are_named():
         gear_scene(GearPair.paper(), shaft_radius=-1.0)
 
 
+@pytest.mark.slow
 def test_pages_fetch_nothing_and_escape_titles(scene, tmp_path):
     scene = Scene(scene.parts, "</title><script>alert(1)</script>", "a", "b", scene.value)
     text = scene.save_html(tmp_path / "scene.html").read_text()
@@ -212,12 +214,14 @@ def test_pages_hold_the_solids_within_a_step_of_their_grid(scene):
         assert np.all(np.abs(ends - feature_edges(part.mesh)) <= half * (1 + 1e-6) + 1e-9)
 
 
+@pytest.mark.slow
 def test_a_page_of_four_wheels_is_small():
     train = Drivetrain.from_file(GEARBOXES["two stages"].file)
     page = mechanism_scene(train.build()).page()
     assert len(page.to_html()) < 1e6
 
 
+@pytest.mark.slow
 def test_plotly_figure(scene):
     pytest.importorskip("plotly", reason="plotly is not installed (extra 'view')")
     figure = scene.plotly(frames=2)

@@ -60,6 +60,7 @@ def compare(found, wanted, k=-1):
 
 @pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize("mode", [3, 4])
+@pytest.mark.slow
 def test_pac2002_gives_the_published_formula(tmp_path, state, mode):
     kappa, alpha, gamma, load = state
     motion = motion_of(*state, rolling_radius(load))
@@ -223,6 +224,7 @@ def test_a_tire_on_the_other_side_is_its_mirror_image(tmp_path):
         assert right[name][-1] == pytest.approx(sign * left[name][-1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_friction_of_the_road_scales_what_a_sliding_tire_carries(tmp_path):
     text = PAC2002.format(mode=1).replace("PVX1 = 0.002", "PVX1 = 0").replace("PVX2 = 0.001", "PVX2 = 0")
     held = {}

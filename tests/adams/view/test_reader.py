@@ -141,6 +141,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("line", BROKEN)
+@pytest.mark.slow
 def test_errors_have_a_line_and_a_reason(line):
     with pytest.raises(DeckError, match=says(*BROKEN[line])) as caught:
         parse_view(PENDULUM + line + "\n", "swing.cmd")

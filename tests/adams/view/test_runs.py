@@ -165,6 +165,7 @@ def test_a_script_that_runs_itself_ends():
         run_deck(parse_view(MODEL + SCRIPT.format(own)))
 
 
+@pytest.mark.slow
 def test_a_script_that_cannot_be_carried_out_is_refused_when_it_is_run(tmp_path):
     stale = SCRIPT.format('commands = "simulation single_run transient end_time=1 number_of_steps=2 model_name=.old"')
     for text in (stale, SCRIPT.format('solver_commands = "simulate/nonsense"')):
@@ -290,6 +291,7 @@ def test_simulations_become_scripts_with_their_decks(tmp_path):
         assert np.isclose(result.segments[-1].solution.com_position("P")[-1, 0], place, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_command_runs_each_analysis(tmp_path):
     path = tmp_path / "x.cmd"
     path.write_text(MODEL + ONE + RESET + PULL.format(40) + ONE)

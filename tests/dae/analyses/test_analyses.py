@@ -74,6 +74,7 @@ def test_pendulum_with_torsion_spring_balances():
     assert swing(found) == pytest.approx(phi, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_body_without_support_is_named():
     m = Mechanism("two", gravity=(0, 0, -G))
     m.body("held", 1.0, (0.1, 0.1, 0.1))

@@ -86,6 +86,7 @@ def first(st):
     return st.y[0]
 
 
+@pytest.mark.slow
 def test_structs_with_the_same_record_and_other_arrays_are_told_apart():
     whole = np.full(3, 7)
     twin = Twin(y=whole, rows=np.zeros((2, 3)), marks=whole)

@@ -65,6 +65,7 @@ def pressed(t, y, yp, out):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.slow
 def test_a_fast_read_out_of_a_slow_unknown(method):
     times = np.linspace(0.0, 3.0, 301)
     result = solve_dae(read_out, (0.0, 3.0), [0.0, 0.0], rtol=1e-8, t_eval=times, method=method)
@@ -76,6 +77,7 @@ def test_a_fast_read_out_of_a_slow_unknown(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.slow
 def test_a_contact_never_pulls(method):
     times = np.linspace(0.0, 20.0, 1001)
     result = solve_dae(pressed, (0.0, 20.0), [1.0, 0.0, 1000.0 * 0.5**1.5], rtol=1e-8, t_eval=times, method=method)
@@ -124,6 +126,7 @@ def height(t, y, yp):
 
 
 @pytest.mark.parametrize("method", BDF)
+@pytest.mark.slow
 def test_every_crossing_of_an_algebraic_unknown_is_found_and_located(method):
     """Several lie in one step."""
     result = solve_dae(read_out, (0.0, 3.0), [0.0, 0.0], rtol=1e-8, events=height, method=method)
@@ -259,6 +262,7 @@ def test_a_multiplier_at_a_breakpoint_is_that_of_one_side(loads, method):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("held", [True, False])
+@pytest.mark.slow
 def test_a_multiplier_at_the_ends_of_a_run_is_that_of_the_inside(held, method):
     """Of x = 3 t + t^2, tabulated with the span and held outside it, or going on."""
 

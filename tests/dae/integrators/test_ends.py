@@ -244,6 +244,7 @@ def _steep(width: float) -> list[tuple[float, Callable, float]]:
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.slow
 def test_rates_that_are_steep_but_finite_run_on(method):
     """Also one that leaves a pole, and one that jumps."""
     rng = np.random.default_rng(seed())

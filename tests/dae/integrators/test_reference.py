@@ -15,6 +15,7 @@ CASES = [(name, form) for name in PROBLEMS for form in ("I3", "SI2", "SI1")]
 
 
 @pytest.mark.parametrize(("name", "formulation"), CASES)
+@pytest.mark.slow
 def test_jacobian_against_central_differences(name, formulation):
     problem = four_bar_chain(3, formulation) if "chain" in name else PROBLEMS[name].make(formulation)
     rng = np.random.default_rng(0)

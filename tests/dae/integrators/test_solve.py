@@ -123,6 +123,7 @@ def test_terminal_event(compiled):
 
 
 @pytest.mark.parametrize("inner", [True, False])
+@pytest.mark.slow
 def test_attributes_of_a_compiled_event_stand_on_it_or_on_what_it_was_made_from(inner):
     def ground(t, y, yp):
         return y[0] - 4.0

@@ -207,6 +207,7 @@ def test_a_correction_that_is_not_finite_is_noticed():
             weight[place] = 1.0
 
 
+@pytest.mark.slow
 def test_a_stale_matrix_is_renewed_before_the_step_is_shortened():
     st = opened(warm())
     st.matrix_fresh = False

@@ -18,6 +18,7 @@ def tumbling() -> Mechanism:
 
 
 @pytest.mark.parametrize("integrator", ["WSTIFF", "IDA"])
+@pytest.mark.slow
 def test_parts_are_the_whole(integrator):
     found: list[tuple] = []
 

@@ -156,6 +156,7 @@ def test_sixty_lines_show_one_harmonic_and_refuse_the_rest_by_name():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("told", "teeth"), [(None, (29, 29)), (0.01, (21, 34))])
+@pytest.mark.hunt
 def test_without_known_marks_the_interval_covers_the_truth(told, teeth):
     error, radius = paper_error()
     lag = closed(error.error)
@@ -258,6 +259,7 @@ def test_the_difference_of_two_loads_knows_no_marks():
 
 
 @pytest.mark.parametrize("case", range(4))
+@pytest.mark.slow
 def test_orders_of_both_shafts_come_back_from_any_pair(case):
     """Lines at chance orders of both shafts and the mesh, perfect discs: each to a part in a thousand."""
     rng = np.random.default_rng(seed(3) + case)
@@ -391,6 +393,7 @@ def test_half_the_lines_are_told_by_the_marks_of_one_disc():
 
 @pytest.mark.parametrize("lines", [64, 100, 360, 1024])
 @pytest.mark.parametrize("error", [0.01, 1e-4, 0.0])
+@pytest.mark.slow
 def test_marks_that_repeat_by_chance_are_rare(lines, error):
     """Of true counts none is doubted: random marks, marks below the counter's noise, and an eccentric disc."""
     turning = free(seconds=0.8)

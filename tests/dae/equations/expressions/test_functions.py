@@ -208,6 +208,7 @@ def test_arrays_and_plants():
         ("ABS(TIME-0.3377)", lambda t: 0.5 * (0.3377**2 + (t - 0.3377) ** 2)),
     ],
 )
+@pytest.mark.slow
 def test_integrals_over_time(text, exact):
     """Inside the table, beyond it, and its derivatives: the integrand and the integrand's slope."""
     tape = compile_expression(f"2*INTEGRAL({text},0,1)", Scope())
@@ -220,6 +221,7 @@ def test_integrals_over_time(text, exact):
             assert (f1, f2) == pytest.approx((2 * g, 2 * g1), rel=1e-13, abs=1e-13)
 
 
+@pytest.mark.slow
 def test_the_integral_of_a_pulse_of_a_thousandth_of_the_span():
     tape = compile_expression("INTEGRAL(IF(TIME-0.33:0,1,IF(TIME-0.331:1,0,0)),0,1)", Scope())
     assert time_series(tape, 0.5)[0] == pytest.approx(1e-3, abs=2e-6)
