@@ -348,12 +348,12 @@ def add_planets(
             bore = planet.marker_at(place, axes, name=f"{name} pin.J")
             m.joint("planar", f"{name} pin plane", bore, pin)
             m.add(pins(f"{name} pin", pin, bore))
-        m.gear_contact(f"{before}sun-planet {k + 1}", members.sun, planet, to_sun[k])
+        m.gear_contact(f"{before}sun-planet {k + 1}", members.sun, planet, to_sun[k], carrier=carrier)
         wheel: Any = planet
         if gears.planet_at_ring is not None:
             wheel = planet.marker((0.0, 0.0, 0.0), turn_z(start["steps"][k]), name=f"{name} step")
         if rim is None:
-            m.gear_contact(f"{name}-ring", wheel, members.ring, to_ring[k])
+            m.gear_contact(f"{name}-ring", wheel, members.ring, to_ring[k], carrier=carrier)
         else:
             wheels.append(wheel if isinstance(wheel, Marker) else wheel.marker(name=f"{name}.wheel"))
     if rim is not None:

@@ -79,6 +79,9 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
     turns : dict of (str, str, str) to float
         About which angle, in rad, AX, AY and AZ start to count, by function and names of the markers:
         ``m.turns["AZ", "shaft.I", "shaft.J"] = 4 * np.pi`` winds a torsion spring twice. Default: 0.
+    carriers : dict of str to str
+        Names of the bodies from which the turns of wheels in mesh count, by the name of the contact; see
+        :meth:`gear_contact`.
     inputs, parameters, outputs : dict
         What :meth:`input`, :meth:`parameter` and :meth:`output` have added, by name.
     aliases : dict of str to str
@@ -131,6 +134,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         self.lump = False
         self.rate_scale: float | None = None
         self.turns: dict[tuple[str, str, str], float] = {}
+        self.carriers: dict[str, str] = {}
         self.given: dict[str, dict[str, Any]] = {}
 
     # --- bodies -----------------------------------------------------------------------------------
@@ -289,7 +293,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         return self.add(Torque(name, marker, other, other, as_function(function, "torque", f"torque '{name}'")))
 
     def gear_contact(
-        self, name: str, wheel_1: Body | Marker, wheel_2: Body | Marker, pair: ContactPair
+        self, name: str, wheel_1: Body | Marker, wheel_2: Body | Marker, pair: ContactPair, carrier: Body | None = None
     ) -> ForceElement:
         """Let the teeth of two wheels touch.
 
@@ -300,6 +304,9 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
             for its own frame.
         pair : ContactPair
             Usually a :class:`gearmbs.gears.GearPair`.
+        carrier : Body, optional
+            What carries the axes of the wheels, from which the turns of a transmission error count, as those of planets
+            do from their carrier; default: the ground. Forces do not depend on it.
 
         Raises
         ------
@@ -309,7 +316,11 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         self._check_name(name)
         i = self._own_marker(f"gear contact '{name}'", wheel_1, f"{name}.I")
         j = self._own_marker(f"gear contact '{name}'", wheel_2, f"{name}.J")
-        return self.add(pair.contact_element(name, i, j))
+        element = self.add(pair.contact_element(name, i, j))
+        if carrier is not None:
+            self._check_body(f"gear contact '{name}': carrier", carrier)
+            self.carriers[name] = carrier.name
+        return element
 
     def add(self, element: E) -> E:
         """Add a force element made elsewhere, of a class derived from `gearmbs.mechanism.parts.elements.ForceElement`.

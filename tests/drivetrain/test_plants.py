@@ -15,6 +15,7 @@ from gearmbs.drivetrain import (
     ElasticClutch,
     GearMesh,
     IdealBearing,
+    PlanetaryStage,
     Shaft,
     SpeedDrive,
     SpeedSensor,
@@ -23,7 +24,7 @@ from gearmbs.drivetrain import (
     Wheel,
 )
 from gearmbs.drivetrain.drives import Drive
-from gearmbs.gears import GearSpec, IdealMesh, loaded_transmission_error
+from gearmbs.gears import GearSpec, IdealMesh, Support, loaded_transmission_error, planetary
 from gearmbs.mechanism import ModelError, make_input
 from gearmbs.studies import train_modes
 from tests.says import says
@@ -239,3 +240,87 @@ def test_a_running_train_whose_torques_do_not_begin_together_is_told_of():
         # what is not there yet balances nothing
         running(make_input("later", "N m", 0.0), 300.0).build()
         stage().build()
+
+
+def test_a_prescribed_speed_gives_the_ratio_at_rest():
+    """What a mesh holds to a driven shaft follows it by the ratio of teeth; its angle grows without end."""
+    train = stage("speed")
+    plant = train.linearize(
+        [("motion", "motor", "rate"), ("torque", "out"), ("transmission_error", "stage", "rate")],
+        [("speed", "out"), ("angle", "out"), ("transmission_error", "stage")],
+    )
+    slow = plant.frequency_response(1e-4)[0].real
+    gear = train.part("gear").gear.base_radius
+    assert plant.dc_gain[0] == pytest.approx([-1.0 / 3.0, 0.0, 1.0 / gear], rel=1e-9, abs=1e-12)
+    assert np.isinf(plant.dc_gain[1]).tolist() == [True, False, True]
+    assert plant.dc_gain[1:, 1] == pytest.approx(slow[1:, 1], rel=1e-6)
+    # a speed that both follow leaves no error of transmission; a rate of errors of flanks lets one grow
+    assert plant.dc_gain[2, 0] == pytest.approx(0.0, abs=1e-12)
+    assert np.isinf(plant.dc_gain[2, 2])
+
+
+@pytest.fixture(scope="module")
+def planets():
+    """Return a set between two shafts that turns, driven at its carrier, as a mechanism, and its solution."""
+    gears = planetary((21, 39, 99), "3 mm", 3, face_width="40 mm", wheels={"fillet_radius": "0.8 mm"})
+    train = Drivetrain(
+        "set",
+        shafts=[
+            Shaft(name="rotor", length="200 mm", diameter="80 mm"),
+            Shaft(name="lay", length="200 mm", diameter="40 mm"),
+        ],
+        bearings=[IdealBearing(name=f"{name} b", shaft=name) for name in ("rotor", "lay")],
+        planetary_stages=[
+            PlanetaryStage(name="low", gears=gears, sun="lay", carrier="rotor", ring="ground", sun_station="40 mm",
+                           pins=Support(radial="1e9 N/m", damping="2 us"))
+        ],
+        drives=[TorqueDrive(name="wind", shaft="rotor", speed="100 rpm", torque="400 N m")],
+        loads=[TorqueLoad(name="gen", shaft="lay", torque="70 N m")],
+        running=True,
+    )  # fmt: skip
+    m = train.build()
+    sim = gm.Simulator(m, 1.0, tol=1e-8, rate_scale=train.rate_scale)
+    for t in (0.0, 0.01, 0.02):
+        sim.advance(t)
+    return m, sim
+
+
+@pytest.mark.slow
+def test_turns_of_planets_in_mesh_count_from_their_carrier(planets):
+    """r_bs (phi_s - phi_c) + r_bp (phi_p - phi_c) are micrometres, where absolute angles leave the carrier's turn."""
+    m, sim = planets
+    name, ring = "low sun-planet 1", "low planet 1-ring"
+    m.output("error", ("transmission_error", name))
+    one, two = (getattr(m.elements[name].pair, which).base_radius for which in ("driver", "driven"))
+    solution = sim.solution()
+    sun, carrier = solution.joint_angle("lay b"), solution.joint_angle("rotor b")
+    start, now = (solution.orientation("low planet 1")[k] for k in (0, -1))
+    planet = np.arctan2((now @ start.T)[1, 0], (now @ start.T)[0, 0])
+    # the planet rolls backwards on the ring: within a turn here
+    expected = one * (sun - carrier)[-1] + two * (planet - carrier[-1])
+    expected -= 2 * np.pi * two * np.round(expected / (2 * np.pi * two))
+    assert abs(expected) < 20e-6
+    assert carrier[-1] > 0.1
+    assert sim.get("transmission_error", name) == pytest.approx(expected, abs=1e-11)
+    assert solution.output("error")[-1] == pytest.approx(expected, abs=1e-11)
+    assert abs(sim.get("transmission_error", ring)) < 20e-6
+    with warnings.catch_warnings():
+        # teeth that run
+        warnings.simplefilter("ignore")
+        plant = m.linearize([("torque", "lay b")], ["error", ("joint_angle", "rotor b")], at=sim.state())
+    assert plant.point.outputs[0] == pytest.approx(expected, abs=1e-11)
+    slow = plant.frequency_response(1e-3)[0, :, 0]
+    assert abs(slow[0] / slow[1]) < 1e-2 * (one + two)
+
+
+@pytest.mark.slow
+def test_carried_axes_whose_carrier_is_not_named_are_refused(planets):
+    m, sim = planets
+    known = dict(m.carriers)
+    try:
+        m.carriers.clear()
+        with pytest.raises(ModelError, match=says("low sun-planet 1", "gear_contact", "carrier")):
+            sim.get("transmission_error", "low sun-planet 1")
+    finally:
+        m.carriers.update(known)
+    assert abs(sim.get("transmission_error", "low sun-planet 1")) < 20e-6

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
+from gearmbs.dae.analyses.plant import LinearPlant
 from gearmbs.dae.problem import ModelError
 from tests.says import says
 
@@ -600,3 +601,19 @@ def test_a_torque_between_bodies_leaves_them_where_they_are_at_rest():
     exact = [[two / (one + two) / 3e8, np.inf], [-2.0 / 3.0, -2.0 / 3.0 * two / (one + two)]]
     assert plant.dc_gain == pytest.approx(np.array(exact), rel=1e-9)
     assert plant.frequency_response(0.0)[0] == pytest.approx(np.array(exact), rel=1e-9)
+
+
+def test_coefficients_beyond_what_a_number_holds_are_refused():
+    """The last coefficient is the product of all poles: of 60 at 1e6 rad/s 1e360, of 20 it is 1e120."""
+    for count, fits in ((20, True), (60, False)):
+        poles = -1e6 * np.linspace(1.0, 2.0, count)
+        states = [f"x{k}" for k in range(count)]
+        ones = np.ones((count, 1))
+        plant = LinearPlant(np.diag(poles), ones, ones.T, np.zeros((1, 1)), states, ["u"], ["y"])
+        exact = np.sum(1.0 / (2j * np.pi * 1e5 - poles))
+        assert plant.frequency_response(1e5)[0, 0, 0] == pytest.approx(exact, rel=1e-9)
+        if fits:
+            assert np.isfinite(plant.transfer_function().den).all()
+        else:
+            with pytest.raises(ModelError, match=says("60", "transfer", "frequency_response")):
+                plant.transfer_function()

@@ -214,16 +214,24 @@ class LinearPlant:
         Raises
         ------
         ModelError
-            If there is no such input or output.
+            If there is no such input or output, and where coefficients, products of up to all poles, exceed what a
+            number holds.
         """
         from scipy.signal import TransferFunction
 
         k, j = self.place(output, "output"), self.place(which)
         poles = self.poles
-        denominator = np.real(np.poly(poles)) if poles.size else np.ones(1)
-        # det(s - A + b c) = (1 + c (s - A)^-1 b) det(s - A)
-        closed = np.real(np.poly(np.linalg.eigvals(self.A - np.outer(self.B[:, j], self.C[k])))) if poles.size else 1.0
-        numerator = np.atleast_1d(closed - denominator + self.D[k, j] * denominator)
+        with np.errstate(over="ignore", invalid="ignore"):
+            denominator = np.real(np.poly(poles)) if poles.size else np.ones(1)
+            # det(s - A + b c) = (1 + c (s - A)^-1 b) det(s - A)
+            loop = self.A - np.outer(self.B[:, j], self.C[k])
+            closed = np.real(np.poly(np.linalg.eigvals(loop))) if poles.size else 1.0
+            numerator = np.atleast_1d(closed - denominator + self.D[k, j] * denominator)
+        if not (np.isfinite(denominator).all() and np.isfinite(numerator).all()):
+            raise ModelError(
+                f"plant: of {poles.size} poles up to {np.abs(poles).max():.3g} the coefficients of a transfer function "
+                "exceed 1e308; take frequency_response(), or the matrices as scipy.signal.StateSpace(*plant)"
+            )
         # the first coefficients are D, C B, C A B ..: zero as long as these are rounding
         row, zeros = self.C[k], int(self.D[k, j] == 0.0)
         while 0 < zeros < numerator.size:
@@ -254,9 +262,12 @@ class LinearPlant:
         if self.own_response is not None:
             power, left = self.own_response.towards_rest(self._slowest)
             return np.where(power > 0, np.inf, np.where(power == 0, left, 0.0))
-        size = float(np.abs(self.poles).max())
-        schur_form, vectors, standing = schur(self.A.astype(complex), sort=lambda s: abs(s) <= STANDING * size)
-        b, c = vectors.conj().T @ self.B, self.C @ vectors
+        fastest = float(np.abs(self.poles).max())
+        # displacements and rates in units in which they are alike: a speed's share of an angle that drifts is else 1e-8
+        alike, (size, _) = matrix_balance(self.A, permute=False, separate=True)
+        seen, given = self.C * size, self.B / size[:, None]
+        schur_form, vectors, standing = schur(alike.astype(complex), sort=lambda s: abs(s) <= STANDING * fastest)
+        b, c = vectors.conj().T @ given, seen @ vectors
         slow, fast = slice(0, standing), slice(standing, None)
         slow_part, fast_part, between = schur_form[slow, slow], schur_form[fast, fast], schur_form[slow, fast]
         # [1 X; 0 1] parts them: slow X - X fast = -between
@@ -264,12 +275,17 @@ class LinearPlant:
         c_fast, b_slow = c[:, fast] + c[:, slow] @ parting, b[slow] - parting @ b[fast]
         gain = self.D - (c_fast @ np.linalg.solve(fast_part, b[fast]) if fast_part.size else 0.0)
         gain = gain.real
-        moved = b_slow
+        # what no input moves, or one integrator hands to another, is rounding of its terms
+        terms = np.abs(b[slow]) + np.abs(parting) @ np.abs(b[fast]) if fast_part.size else np.abs(b[slow])
+        largest = np.linalg.norm(terms, axis=0)
+        moved = np.where(np.linalg.norm(b_slow, axis=0) > SHOWN * largest, b_slow, 0.0)
+        handed = np.triu(slow_part, 1)
+        handed[np.abs(handed) <= SHOWN * fastest] = 0.0
         # the terms C A^k B / s^(k+1) of the integrators
         for _ in range(standing):
-            sizes = np.outer(np.linalg.norm(self.C, axis=1), np.linalg.norm(moved, axis=0))
+            sizes = np.outer(np.linalg.norm(seen, axis=1), np.linalg.norm(moved, axis=0))
             gain[np.abs(c[:, slow] @ moved) > SHOWN * sizes] = np.inf
-            moved = slow_part @ moved
+            moved = handed @ moved
         return gain
 
     def step(self, times: np.ndarray, which: str | int | Sequence[Any] = 0) -> np.ndarray:

@@ -254,10 +254,11 @@ class ShapedMarker(Marker):
     turned: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
 
-def centre_marker(body: ModalBody, name: str) -> ShapedMarker:
+def centre_marker(body: ModalBody, name: str, axes: np.ndarray | None = None) -> ShapedMarker:
     """Return a marker that is the frame of a body at its centre of mass: what is told of the body itself."""
     still = np.zeros_like(body.mean)
-    found = ShapedMarker(name, body, body.com.copy(), np.eye(3), moved=body.mean, turned=still)
+    axes = np.eye(3) if axes is None else axes
+    found = ShapedMarker(name, body, body.com.copy(), axes, moved=body.mean, turned=still)
     body.markers.append(found)
     return found
 

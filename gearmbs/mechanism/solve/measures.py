@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from gearmbs.mechanism.mechanism import Mechanism
 
 
+CARRIED = 0.1
+"""Turn of a line of centres, rad, that no bearing allows: a tenth of the centre distance."""
+
+
 class Measures:
     """Measurements on a solution of a mechanism; :class:`gearmbs.dae.results.solution.Solution` has them as methods.
 
@@ -156,10 +160,11 @@ class Measures:
     def transmission_error(self, mesh: Any) -> np.ndarray:
         """Return r_b1 phi_1 + s r_b2 phi_2, s = 1 for external and -1 for internal pairs, shape (m,), m.
 
-        The angles of the wheels about their axes count from the mechanism's initial position. They are known up to full
-        turns, so up to base pitches: what is told is nearest to zero.
+        The angles of the wheels about their axes count from the mechanism's initial position, of wheels that a body
+        carries from that body (`Mechanism.gear_contact`). They are known up to full turns, so up to base pitches: what
+        is told is nearest to zero.
         """
-        from gearmbs.mechanism.solve.plant_names import levers, pair_of
+        from gearmbs.mechanism.solve.plant_names import carrier_of, levers, pair_of
 
         name = getattr(mesh, "name", mesh)
         meshes = {n: e for n, e in self.mechanism.elements.items() if pair_of(e) is not None}
@@ -167,12 +172,33 @@ class Measures:
             raise KeyError(f"mesh {name!r}; the gear contacts are {', '.join(meshes) or 'none'}")
         element, total = meshes[name], np.zeros(self.solution.t.size)
         *both, pitch = levers(element)
+        carrier = carrier_of(self.mechanism, element)
+        if carrier.is_ground:
+            self._check_axes(element)
         for marker, lever in zip((element.i, element.j), both, strict=True):
             first, now = marker.global_orientation(), self._axes(marker)[:, :, 0]
             # term by term: a product of matrices rounds otherwise for one instant than for many
-            x, y = (now[:, 0] * first[0, c] + now[:, 1] * first[1, c] + now[:, 2] * first[2, c] for c in (0, 1))
+            if carrier.is_ground:
+                x, y = (now[:, 0] * first[0, c] + now[:, 1] * first[1, c] + now[:, 2] * first[2, c] for c in (0, 1))
+            else:
+                frame = self._motion(carrier)[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+                on = carrier.orientation.T @ first
+                carried = [[sum(frame[:, r, k] * on[k, c] for k in range(3)) for r in range(3)] for c in (0, 1)]
+                x, y = (now[:, 0] * one[0] + now[:, 1] * one[1] + now[:, 2] * one[2] for one in carried)
             total += lever * np.arctan2(y, x)
         return total - pitch * np.round(total / pitch)
+
+    def _check_axes(self, element: Any) -> None:
+        """Refuse wheels whose line of centres has turned: of carried axes absolute angles are no transmission error."""
+        axis = element.i.global_orientation()[:, 2]
+        first = element.j.global_position() - element.i.global_position()
+        now = self._motion(element.j)[:, KIN_R : KIN_R + 3] - self._motion(element.i)[:, KIN_R : KIN_R + 3]
+        turned = np.arctan2(np.cross(first, now) @ axis, now @ first - (now @ axis) * (first @ axis))
+        if (largest := float(np.abs(turned).max(initial=0.0))) > CARRIED:
+            raise ModelError(
+                f"gear contact '{element.name}': the line of centres of its wheels has turned by {largest:.3g} rad, as "
+                "of a planet; name what carries them, gear_contact(..., carrier=body), from which their turns count"
+            )
 
     def output(self, name: str) -> Any:
         """Return an output of the mechanism by its name over time."""

@@ -91,6 +91,8 @@ class Told:
     unit: str
     expression: str
     accelerations: tuple[Acceleration, ...] = ()
+    period: float = 0.0
+    """Its value is known up to whole numbers of this, and told nearest to zero; 0: it is known."""
 
 
 @dataclass
@@ -403,11 +405,11 @@ class PlantNames:
 
     def _error(self, mesh: Any) -> list[Told]:
         element = self._mesh(mesh)
-        parts = []
-        for marker, lever in zip((element.i, element.j), levers(element)[:2], strict=True):
-            at = unturned(self.mechanism, marker)
+        parts, (*both, pitch) = [], levers(element)
+        for marker, lever in zip((element.i, element.j), both, strict=True):
+            at = unturned(self.mechanism, marker, element)
             parts.append(f'{lever!r}*AZ("{marker.name}", "{at.name}")')
-        return [Told(f"transmission_error {element.name}", "m", " + ".join(parts))]
+        return [Told(f"transmission_error {element.name}", "m", " + ".join(parts), period=pitch)]
 
     # --- what is there ------------------------------------------------------------------------------
 
@@ -478,10 +480,19 @@ def own_marker(body: Body, name: str, make: Callable[..., Marker], *where: Any) 
     return next((one for one in body.markers if one.name == name), None) or make(*where, name=name)
 
 
-def unturned(mechanism: Mechanism, marker: Marker) -> Marker:
-    """Return the marker of the ground from which a wheel's turn counts, made where it is if it is not there yet."""
-    ground, where = mechanism.ground, (marker.global_position(), marker.global_orientation())
-    return own_marker(ground, f"{marker.name} plant ground", ground.marker_at, *where)
+def carrier_of(mechanism: Mechanism, element: Any) -> Body:
+    """Return the body from which the turns of the wheels of a mesh count."""
+    return mechanism.bodies.get(mechanism.carriers.get(element.name, ""), mechanism.ground)
+
+
+def unturned(mechanism: Mechanism, marker: Marker, element: Any) -> Marker:
+    """Return the marker of the ground, or a carrier, from which a wheel's turn counts, made if it is not there yet."""
+    body, axes = carrier_of(mechanism, element), marker.global_orientation()
+    name = f"{marker.name} plant {'ground' if body.is_ground else 'carrier'}"
+    if isinstance(body, ModalBody):
+        # its frame, which goes through no node
+        return own_marker(body, name, partial(centre_marker, body, axes=body.orientation.T @ axes))
+    return own_marker(body, name, body.marker_at, marker.global_position(), axes)
 
 
 def count_from_here(mechanism: Mechanism) -> None:
@@ -489,7 +500,7 @@ def count_from_here(mechanism: Mechanism) -> None:
     for element in mechanism.elements.values():
         if pair_of(element) is not None:
             for marker in (element.i, element.j):
-                unturned(mechanism, marker)
+                unturned(mechanism, marker, element)
 
 
 def _at_level(given: Given) -> Given:

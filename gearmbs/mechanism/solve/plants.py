@@ -343,12 +343,10 @@ def _plant(
         for level in range(one.level - len(acting)):
             states.append(f"{one.name} ({LEVELS[level]})")
             state_units.append(one.unit_of(level))
-    point = OperatingPoint(
-        instant.t,
-        np.array([_value(instant, one) for one in given]),
-        -instant.residual(instant.y)[instant.at["z"] + np.flatnonzero(kinds)][outputs],
-        state,
-    )
+    values = -instant.residual(instant.y)[instant.at["z"] + np.flatnonzero(kinds)][outputs]
+    periods = np.array([one.period for one in told])
+    values -= periods * np.round(np.divide(values, periods, out=np.zeros_like(values), where=periods > 0.0))
+    point = OperatingPoint(instant.t, np.array([_value(instant, one) for one in given]), values, state)
     return LinearPlant(
         change @ a @ back, change @ b, c @ back, d, states, [one.name for one in given], labels, 1.0, state_units,
         [one.unit for one in given], [one.unit for one in told], point,
