@@ -24,6 +24,7 @@ from gearmbs.signals.encoders.orders import (
     multiples,
     scatter,
     taken_out,
+    turn_by_turn,
 )
 from gearmbs.signals.encoders.pulses import TURN
 
@@ -68,18 +69,20 @@ def lines_by_meetings(
         return lines(whole, orders, steps, window, signs, mesh, hidden)
     meetings = window.turns / float(period)
     wanted = multiples(orders, steps)
-    values, variances = dict.fromkeys(orders, 0.0j), dict.fromkeys(orders, 0.0)
+    values = dict.fromkeys(orders, 0.0j)
+    turns: dict[Fraction, np.ndarray] = {}
     for one, sign, count, beyond in zip(found, signs, counts, hidden, strict=True):
         mean, left = _mean_meeting(one, count, float(period), window)
         closed = Window(float(mean.phi[0]), float(period), 0.0)
         own, _ = taken_out(bridged(mean, known, closed), orders, wanted, closed, mesh, beyond)
-        # a mean of n has 1/n of the noise, which what is left lacks
-        lost = meetings / (meetings - 1.0)
-        for order, variance in scatter(one, left, wanted, window).items():
-            variances[order] += lost * variance
+        for order, by_turn in turn_by_turn(one, left, wanted, window).items():
+            turns[order] = turns.get(order, 0.0) + sign * by_turn
         for order, value in own.items():
             values[order] += sign * value
-    return {order: Line(values[order], variances[order]) for order in orders}
+    # a mean of n has 1/n of the noise, which what is left lacks
+    lost = meetings / (meetings - 1.0)
+    variances = scatter(turns, wanted, window)
+    return {order: Line(values[order], lost * variances.get(order, 0.0)) for order in orders}
 
 
 def _mean_meeting(one: Deviations, count: int, period: float, window: Window) -> tuple[Deviations, np.ndarray]:

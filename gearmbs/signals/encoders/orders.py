@@ -27,6 +27,9 @@ SAMPLED_TURN = 32
 """Points of a turn at which the smooth angle is taken: it has nothing above a few orders."""
 SMOOTHINGS = 2
 """Courses of means over a turn, the second upon the first; each takes half a turn at either end."""
+FINE = 12
+"""Parts of a turn over which the common angle is smoothed, twice: of a swing of order 1 a part in 1900 is left beside
+it, of order 4 a tenth, of order 12 all; of teeth nothing is let through."""
 FEWEST_TURNS = 4
 """Turns of the slower shaft within the smooth angle: a window of as many parts orders that lie one apart."""
 BRIDGINGS = 3
@@ -139,10 +142,46 @@ def smooth_angle(train: PulseTrain) -> Course:
     return course
 
 
+def common_angle(train: PulseTrain, errors: np.ndarray | None = None) -> Course:
+    """Return the angle of a shaft with what swings of it a few times a turn: means over a part of a turn at a time.
+
+    Lines of a mesh are lines over the angle that its wheels turn by. Over an angle that lacks a swing b cos(o phi) of
+    the shaft, the line of the order k has J0(k b) of its height, and the rest is beside it.
+
+    Parameters
+    ----------
+    train : PulseTrain
+    errors : ndarray of shape (lines,), optional
+        Of its marks, rad. Unknown ones are taken for swing of the shaft, which the difference of two encoders lacks.
+    """
+    course = smooth_angle(train)
+    numbers, times, there = train.every()
+    angle = TURN / train.lines * numbers
+    if errors is not None:
+        angle += errors[numbers % train.lines]
+    span = max(1, train.lines // FINE)
+    for _ in range(SMOOTHINGS):
+        inside = (times >= course.begin) & (times <= course.end)
+        times, angle, there = times[inside], angle[inside], there[inside]
+        ahead = angle - course.angle(times)
+        ahead[~there] = np.interp(times[~there], times[there], ahead[there])
+        mean, middle = (_means(span, 1, _means(span, 1, values)) for values in (times, ahead))
+        mean, middle = (values[:: max(1, train.lines // SAMPLED_TURN)] for values in (mean, middle))
+        course = Course(
+            scipy.interpolate.CubicSpline(mean, course.angle(mean) + middle), float(mean[0]), float(mean[-1])
+        )
+    return course
+
+
 def _turn_means(count: int, values: np.ndarray) -> np.ndarray:
     """Return means over `count` values, `SAMPLED_TURN` times a turn."""
+    return _means(count, max(1, count // SAMPLED_TURN), values)
+
+
+def _means(count: int, step: int, values: np.ndarray) -> np.ndarray:
+    """Return means over `count` values, one each `step`."""
     sums = np.concatenate(([0.0], np.cumsum(values - values[0])))
-    first = np.arange(0, values.size - count + 1, max(1, count // SAMPLED_TURN))
+    first = np.arange(0, values.size - count + 1, step)
     return values[0] + (sums[first + count] - sums[first]) / count
 
 
@@ -261,14 +300,15 @@ def lines(
     """
     wanted = multiples(orders, steps)
     values = dict.fromkeys(orders, 0.0j)
-    variances = dict.fromkeys(orders, 0.0)
+    turns: dict[Fraction, np.ndarray] = {}
     for one, sign, beyond in zip(found, signs, hidden or [()] * len(found)):
         own, left = taken_out(one, orders, wanted, window, mesh, beyond)
-        for order, variance in scatter(one, left, wanted, window).items():
-            variances[order] += variance
+        for order, by_turn in turn_by_turn(one, left, wanted, window).items():
+            turns[order] = turns.get(order, 0.0) + sign * by_turn
         for order, value in own.items():
             values[order] += sign * value
-    return {order: Line(values[order], variances[order]) for order in orders}
+    variances = scatter(turns, wanted, window)
+    return {order: Line(values[order], variances.get(order, 0.0)) for order in orders}
 
 
 Multiples = dict[Fraction, dict[int, Fraction]]
@@ -342,9 +382,9 @@ def _clear_of_leaks(
     return {k: order for k, order in hidden.items() if clear[int(np.searchsorted(number, k))]}
 
 
-def scatter(one: Deviations, left: np.ndarray, wanted: Multiples, window: Window) -> dict[Fraction, float]:
-    """Return the variances of lines by how they scatter from turn to turn in what is left beside them."""
-    variances = {}
+def turn_by_turn(one: Deviations, left: np.ndarray, wanted: Multiples, window: Window) -> dict[Fraction, np.ndarray]:
+    """Return the lines of each turn, or of `MOST_SCATTER` of them, in what is left beside the lines of the record."""
+    found = {}
     for step, places in wanted.items():
         length = TURN / float(step)
         whole = math.floor(window.length * float(step) + WHOLE)
@@ -357,10 +397,19 @@ def scatter(one: Deviations, left: np.ndarray, wanted: Multiples, window: Window
         picked = np.concatenate([np.arange(a, b) for a, b in zip(first, last)])
         begins = np.concatenate(([0], np.cumsum(last - first)[:-1]))
         plain = ((2.0 / length) * one.spacing * left)[picked]
-        share = 0.5 * window.noise / (window.turns * float(step))
         for order, rotating in _rotating(one.phi[picked], step, places):
-            by_turn = np.add.reduceat(plain * rotating, begins)
-            variances[order] = share * float(np.var(by_turn, ddof=1))
+            found[order] = np.add.reduceat(plain * rotating, begins)
+    return found
+
+
+def scatter(turns: dict[Fraction, np.ndarray], wanted: Multiples, window: Window) -> dict[Fraction, float]:
+    """Return the variances of lines by how those of the turns scatter."""
+    variances = {}
+    for step, places in wanted.items():
+        share = 0.5 * window.noise / (window.turns * float(step))
+        for order in places.values():
+            if order in turns:
+                variances[order] = share * float(np.var(turns[order], ddof=1))
     return variances
 
 

@@ -23,6 +23,7 @@ from gearmbs.signals.encoders.orders import (
     Line,
     Window,
     bridged,
+    common_angle,
     deviations,
     folded,
     smooth_angle,
@@ -31,14 +32,12 @@ from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
 from gearmbs.signals.encoders.visible import (
-    EVEN,
     MOST_HARMONICS,
     Order,
     folded_onto,
     hidden_harmonics,
     shadow,
     standing_harmonics,
-    unevenness,
     visible_orders,
 )
 from gearmbs.signals.errors import MissingMetadataError, SignalError
@@ -324,8 +323,7 @@ def _all_lines(
 ) -> tuple[list[_Measured], dict[Fraction, tuple[str, int]]]:
     """Evaluate all runs; with known marks, also the shafts' orders that turn out to be later mesh harmonics, folded."""
     trains = (runs[0].driver, runs[0].driven)
-    even = max(map(unevenness, trains)) <= EVEN
-    hidden = hidden_harmonics(gearing, trains, orders) if even else [[], []]
+    hidden = hidden_harmonics(gearing, trains, orders)
     measured = [_lines_of(run, gearing, orders, hidden, errors) for run in runs]
     if any(known is None for known in errors.values()):
         return measured, {}
@@ -341,7 +339,7 @@ def _lines_of(
     errors: Mapping[str, np.ndarray | None],
 ) -> _Measured:
     """Evaluate a run at all orders."""
-    course = smooth_angle(run.driver)
+    course = common_angle(run.driver, errors["driver"])
     begin, end = _common(course, run.driven)
     turn = max(float(gearing.ratio), 1.0)
     slower = (end - begin) / (TURN * turn)

@@ -108,29 +108,6 @@ def _fine(gearing: Gearing, trains: Sequence[PulseTrain], harmonics: int) -> lis
     return sorted(fine & some)
 
 
-EVEN = 0.0035
-"""Variation of the speed, RMS over its mean, up to which hidden harmonics are taken out: the turning that both shafts
-share leaks into their orders, and it is not the same orders of both discs. Of records of 100 and 90 lines whose speed
-swings by 0.3 % (RMS 0.002) harmonics are right with and without, by 1 % (0.007) they are up to 53 % off with."""
-SLOW = 4
-"""Orders of a shaft below which its speed is looked at."""
-BLOCK = 8
-"""Lines over which a speed is taken, of discs with few: errors of marks of 1 % leave 0.2 % of it, half of that slow."""
-
-
-def unevenness(train: PulseTrain) -> float:
-    """Return the RMS variation of a shaft's speed over its mean, of orders below `SLOW`."""
-    lines = max(train.lines // (4 * SLOW), min(BLOCK, train.lines // (2 * SLOW)), 1)
-    steps = np.arange(train.numbers[0], train.numbers[-1] + 1, lines)
-    times = np.interp(steps, train.numbers, train.times)
-    if times.size < 8:
-        return 0.0
-    speed = 1.0 / np.diff(times)
-    swing = np.fft.rfft(speed / speed.mean() - 1.0)
-    orders = np.fft.rfftfreq(speed.size, lines / train.lines)
-    return float(np.sqrt(2.0 * np.sum(np.abs(swing[orders < SLOW]) ** 2)) / speed.size)
-
-
 def hidden_harmonics(gearing: Gearing, trains: Sequence[PulseTrain], orders: Sequence[Order]) -> list[list[Fraction]]:
     """Return for each encoder the mesh orders that are not looked for and that it sees somewhere, folded or not.
 
