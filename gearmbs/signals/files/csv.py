@@ -24,6 +24,8 @@ import pandas as pd
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.labview import read_lvm
+from gearmbs.signals.files.own_clocks import on_first_clock, own_clocks
+from gearmbs.signals.files.scopes import scope_layout
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
 from gearmbs.signals.files.text_tables import (
     COMMENT,
@@ -111,7 +113,7 @@ def read_csv(
         are empty and `gaps` does not say what to do with them.
     """
     with _damage_named(path):
-        layout = _layout(path, packed)
+        layout = _layout(path, packed, pulses)
         if pulses and layout.index is not None and layout.names[layout.index].strip().lower() not in INDEX_NAMES:
             layout = replace(layout, index=None)
         times = Times(layout, path)
@@ -128,6 +130,8 @@ def read_csv(
         clock = np.concatenate(known) if known else None
         values = np.concatenate(blocks)
         said = [] if pulses else _bridged(path, values, layout, gaps)
+        if layout.groups:
+            said += on_first_clock(path, values, layout.groups, layout.names, layout.units)
         found = _record(path, values, clock, layout, rate)
         said += _end_checked(path, packed, layout, len(found.values))
         return replace(found, notes=[*found.notes, *said]) if said else found
@@ -231,6 +235,8 @@ def _bridged(path: Path, values: np.ndarray, layout: CsvLayout, gaps: str | None
     """
     said = []
     for i in layout.slow:
+        if i in layout.own:
+            continue
         there = np.flatnonzero(np.isfinite(values[:, i]))
         lost = len(values) - there.size
         if not lost or not there.size:
@@ -272,12 +278,14 @@ def _damage_named(path: Path) -> Iterator[None]:
         raise SignalFileError(path, f"its gzip data is damaged or cut short ({exc})") from exc
 
 
-def _layout(path: Path, packed: bool) -> CsvLayout:
+def _layout(path: Path, packed: bool, pulses: bool = False) -> CsvLayout:
     with _open_text(path, packed) as (text, _):
         head = [line for line, _ in zip(text, range(HEAD_LINES))]
     if any("\x00" in line for line in head):
         raise SignalFileError(path, "holds binary data, not text; is it in another format?")
-    return find_layout(head, path)
+    layout = scope_layout(head) or find_layout(head, path)
+    groups = () if pulses or layout.stamps else own_clocks(layout.names, layout.units)
+    return replace(layout, groups=groups, clock=groups[0].clock, index=None) if groups else layout
 
 
 class _Pointed(io.TextIOBase):
@@ -302,7 +310,8 @@ def _blocks(
     width, first, separator = len(layout.names), layout.first, layout.separator
     size = path.stat().st_size
     refuse = checked_gaps(gaps) == "refuse"
-    kinds: dict[int, Any] = {i: str if i in layout.stamps else float for i in range(width)}
+    words = (*layout.stamps, *layout.beside)
+    kinds: dict[int, Any] = {i: str if i in words else float for i in range(width)}
     try:
         with _open_text(path, packed) as (text, raw):
             for _ in range(first):
@@ -324,10 +333,10 @@ def _blocks(
             )
             for block in table:
                 stamped = block[list(layout.stamps)] if layout.stamps else None
-                numbers = block.drop(columns=list(layout.stamps)) if layout.stamps else block
+                numbers = block.drop(columns=list(words)) if words else block
                 values = np.full((len(block), width), np.nan)
                 values[:, numbers.columns] = numbers.to_numpy()
-                wanted = [i for i in range(width) if i not in {*layout.stamps, *layout.empty, *layout.slow}]
+                wanted = [i for i in range(width) if i not in {*words, *layout.empty, *layout.slow}]
                 if refuse and not np.isfinite(values[:, wanted]).all():
                     raise ValueError("missing values")
                 yield values, stamped, min(1.0, raw.tell() / size)
@@ -344,7 +353,8 @@ def _record(
     t0 = number_of(layout.meta.get("t0"))
     start = 0.0 if t0 is None else t0[0]
     notes = list(layout.notes)
-    dropped = {*layout.stamps, *layout.empty, *([] if layout.clock is None else [layout.clock])}
+    dropped = {*layout.stamps, *layout.empty, *layout.beside, *(clock for clock, _ in layout.groups)}
+    dropped |= set() if layout.clock is None else {layout.clock}
     if layout.index is not None:
         # a heading that means rows is believed sooner than none or any other
         fewest = 2 if layout.names[layout.index].strip().lower() in INDEX_NAMES else FEWEST_EVEN
@@ -450,7 +460,7 @@ def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, ref
             if len(cells) > width or (refuse and len(cells) < width):
                 return f"line {number} has {len(cells)} values where {width} are expected: {line.strip()[:60]!r}"
             for column, cell in enumerate(cells):
-                if column in layout.stamps or column in layout.empty:
+                if column in (*layout.stamps, *layout.empty, *layout.beside):
                     continue
                 kind = cell_kind(cell, layout.decimal)
                 if kind == "gap" and refuse and column not in layout.slow:
@@ -480,7 +490,11 @@ def _format(packed: bool, contents: dict[str, Content], also: tuple[str, ...] = 
         return read_csv(path, packed, asked.progress, asked.rate, asked.gaps, asked.pulses)
 
     def pieces(path: Path, asked: Asked) -> Iterator[tuple[Record, float]] | None:
-        return None if asked.content == "lvm" else csv_pieces(path, packed, asked.rate, asked.gaps)
+        if asked.content == "lvm":
+            return None
+        with _damage_named(path):
+            whole = bool(_layout(path, packed).groups)
+        return None if whole else csv_pieces(path, packed, asked.rate, asked.gaps)
 
     def write(record: Record, path: Path, progress: Progress | None) -> None:
         write_csv(record, path, packed, progress)

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.own_clocks import FACTORS, Group
 from gearmbs.signals.signal.labels import (
     is_clock,
     is_unit_of_column,
@@ -34,12 +35,15 @@ KEY_VALUE = re.compile(r"^\s*[#%]*\s*[\"']?([^\W\d][^:=;,\t\"]*?)[\"']?\s*(?:[:=
 GAP_CELLS = frozenset(
     {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf"}
 )
-DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4})"
+DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.](?:\d{1,2}|[A-Za-z]{3})[-/.]\d{4})"
 CLOCK = r"(?:\d+ days? )?\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?"
+DURATION = re.compile(r"^([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?) ?(ms|sec|s|min|hr|days|day)$")
+"""As MATLAB writes times of a timetable."""
 STAMPS: tuple[tuple[str, re.Pattern[str]], ...] = (
     ("stamp", re.compile(rf"^{DATE}[T ]{CLOCK}$")),
     ("date", re.compile(rf"^{DATE}$")),
     ("clock", re.compile(rf"^{CLOCK}$")),
+    ("clock", DURATION),
 )
 SEPARATIONS: tuple[tuple[str | None, str], ...] = (
     (";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (",", ","), (None, "."), (None, ","),
@@ -49,6 +53,7 @@ TIME_UNITS = frozenset(("s", "sec", "ms", "us", "µs", "ns"))
 INDEX_NAMES = frozenset(
     {"", "unnamed: 0", "index", "idx", "sample", "samples", "nr", "no", "no.", "#", "row", "level_0"}
 )
+NO_UNIT = frozenset(("-", "--", "\u2013", "[-]", "(-)"))
 Kind = Literal["number", "gap", "stamp", "date", "clock", "text"]
 
 
@@ -75,6 +80,10 @@ class CsvLayout:
         Column that may only number the rows, or hold times.
     halves : bool
         Whether each second comma is that of a number (`pointed`).
+    beside : tuple of int
+        Columns of words beside the table, of no use.
+    groups : tuple of Group
+        Where columns have times of their own: each column of times, the first one of the table's, with its others.
     """
 
     first: int
@@ -89,12 +98,20 @@ class CsvLayout:
     empty: tuple[int, ...] = ()
     notes: list[str] = field(default_factory=list)
     halves: bool = False
+    beside: tuple[int, ...] = ()
+    groups: tuple[Group, ...] = ()
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """Columns with times of their own, and these."""
+        return tuple(i for clock, columns in self.groups[1:] for i in (clock, *columns))
 
     @property
     def slow(self) -> tuple[int, ...]:
-        """Columns of speeds, pulses and temperatures, which may be written in some rows only."""
+        """Columns of speeds, pulses and temperatures, which may be written in some rows only; and `own`."""
         named = zip(self.names, self.units, strict=True)
-        return tuple(i for i, (name, unit) in enumerate(named) if role_of(name, unit) is not None and i != self.clock)
+        told = [i for i, (name, unit) in enumerate(named) if role_of(name, unit) is not None and i != self.clock]
+        return tuple(dict.fromkeys([*told, *self.own]))
 
 
 def find_layout(head: list[str], path: Path) -> CsvLayout:
@@ -121,7 +138,7 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         kinds = kinds[::2]
         notes.append(f"{seen}: each second comma is read as that of a number, {pointed(head[first]).strip()[:60]!r}.")
     width = len(kinds)
-    head = ["" if _tells_types(line, separator) else line for line in head[:first]]
+    head = _without_types(head[:first], separator)
     labels, header_line = _labels(head, separator, width)
     units_row = None
     bare = [name_and_unit(label) for label in labels] if labels else []
@@ -164,14 +181,26 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
 
 
 TYPES = re.compile(
-    r"(dt_)?(double|float|single|real|numeric|number|u?int(eger)?|bool(ean)?|string|r[48])[_ ]?(8|16|32|64)?"
+    r"(dt_)?(unsigned |long )?(double|float|single|real|numeric|number|decimal|u?int(eger)?|long|short|bool(ean)?|"
+    r"string|char|text|utf)(_?(8|16|32|64))?(_t)?|r[48]|"
+    r"[<>=|]?[bcfiou]\d{1,2}|[<>=|]?[asu]\d+|[<>=|]?m8(\[\w+\])?|(datetime|timedelta)64(\[[\w, /]+\])?|object|category|"
+    r"dbl|sgl|ext|i(8|16|32|64)|u(8|16|32|64)|num|chr|lgl|fct|dttm|posix[cl]t|character|factor|logical|cell|cellstr|"
+    r"l?real|[us]?l?int|u?[sd]int|[dl]?word|byte|l?time|l?date|dt|datetime|duration|timestamp|(big|small)int|"
+    r"(decimal|numeric|varchar|char)\(\d+(,\s*\d+)?\)"
 )
+"""How columns are stored, in the words of C, numpy, pandas, MATLAB, R, LabVIEW, controllers and data bases."""
 
 
-def _tells_types(line: str, separator: str | None) -> bool:
-    """Whether a line says how the numbers of its columns are stored."""
-    cells = [cell.lower() for cell in split_cells(line, separator)]
-    return len(cells) > 1 and all(TYPES.fullmatch(cell) for cell in cells)
+def _without_types(head: Sequence[str], separator: str | None) -> list[str]:
+    """Return lines with empty ones for those that say how numbers are stored, where others may be the headings."""
+    rows = [split_cells(line, separator) for line in head]
+    words = [len(row) if row and not any(is_number(cell, ".") for cell in row) else 0 for row in rows]
+    return [
+        ""
+        if len(row) > 1 and words.count(len(row)) > 1 and all(TYPES.fullmatch(cell.lower()) for cell in row)
+        else line
+        for line, row in zip(head, rows, strict=True)
+    ]
 
 
 def cell_kind(cell: str, decimal: str) -> Kind:
@@ -320,16 +349,17 @@ def _units_row(
         and any(in_brackets)
     ):
         return upper, [(m.group(1).strip() if m else "") or UNKNOWN_UNITS for m in in_brackets]
-    plain = [label.strip() for label in labels]
+    plain = ["" if label.strip() in NO_UNIT else label.strip() for label in labels]
     if len(upper) == width and all(map(is_unit_of_column, upper)) and not any(map(is_unit_of_column, plain)):
         # units above the names
         return plain, upper
-    stated = plain[0] and all(not unit or is_unit_of_column(unit) for unit in plain)
+    counted = bool(upper) and upper[0].strip().lower() in INDEX_NAMES and any(plain)
+    stated = (plain[0] or counted) and all(not unit or is_unit_of_column(unit) for unit in plain)
     # of a row of units alone the names above need not begin with the time's
     if (
         len(upper) == width
         and stated
-        and (is_clock(upper[0]) or (all(plain) and not any(map(is_unit_of_column, upper))))
+        and (counted or is_clock(upper[0]) or (all(plain) and not any(map(is_unit_of_column, upper))))
     ):
         return upper, [unit or UNKNOWN_UNITS for unit in plain]
     return None
@@ -371,8 +401,8 @@ def _values(key: str, text: str, separator: str | None) -> Sequence[tuple[str, s
 # Columns of times in text tables: seconds, time stamps, dates and times of day; and columns that number the rows.
 
 
-FACTORS = {"ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 NAMED_UNIT = re.compile(r"[_\s](ms|us|ns|min)$", re.IGNORECASE)
+MONTHS = {name: f"{k:02d}" for k, name in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), 1)}
 DAY = 86400.0
 """Seconds."""
 LONGEST_SECONDS = 1.0
@@ -408,7 +438,9 @@ class Times:
         for column in stamped.columns[1:]:
             texts = texts + " " + stamped[column].astype(str).str.strip().str.strip('"')
         texts = texts.str.replace(",", ".", regex=False)
-        if re.match(r"^(\d+ days? )?\d{1,2}:", texts.iloc[0]):
+        if DURATION.match(texts.iloc[0]):
+            seconds = self._of_durations(texts)
+        elif re.match(r"^(\d+ days? )?\d{1,2}:", texts.iloc[0]):
             seconds = self._of_clocks(texts)
         else:
             seconds = self._of_dates(texts)
@@ -447,6 +479,13 @@ class Times:
         self.first_tick = int(ticks[0]) if self.first_tick is None else self.first_tick
         return (ticks - self.first_tick) * 1e-9
 
+    def _of_durations(self, texts: pd.Series) -> np.ndarray:
+        found = texts.str.extract(DURATION.pattern)
+        if found[0].isna().any():
+            row = int(np.argmax(found[0].isna().to_numpy()))
+            raise SignalFileError(self.path, f"its time in row {row + 1} of the table is {texts.iloc[row]!r}")
+        return (found[0].astype(float) * found[1].map(FACTORS).fillna(1.0)).to_numpy(dtype=float)
+
     def _of_clocks(self, texts: pd.Series) -> np.ndarray:
         padded = texts.where(texts.str.count(":") == 2, texts + ":00")
         try:
@@ -463,6 +502,10 @@ class Times:
 
 def _iso(texts: pd.Series) -> pd.Series:
     """Stamps with their dates as year-month-day; of 3/4/2024 the day comes first unless that cannot be."""
+    if re.match(r"^\d{1,2}-[A-Za-z]{3}-", texts.iloc[0]):
+        named = texts.str.extract(r"^(\d{1,2})-([A-Za-z]{3})-(\d{4})(.*)$")
+        number = named[1].str.lower().map(MONTHS)
+        return texts if number.isna().any() else named[2] + "-" + number + "-" + named[0].str.zfill(2) + named[3]
     year_first = texts.str.extract(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(.*)$")
     if year_first[0].notna().all():
         parts = [year_first[k] for k in (0, 1, 2, 3)]
