@@ -120,7 +120,7 @@ def test_vibration_with_its_own_times_is_refused_by_name(tmp_path):
     def row(i):
         return f"{TIME[i]:.4f},{A[i]}," + (f"{2 * TIME[i]:.4f},{A[i]}" if 2 * i < COUNT else ",")
 
-    with pytest.raises(SignalFileError, match=says("b", "t_b", "file of their own")):
+    with pytest.raises(SignalFileError, match=says("b", "t_b", "file")):
         read(tmp_path, ["t_a,a,t_b,b"], row)
 
 
