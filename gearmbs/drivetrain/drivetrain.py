@@ -84,7 +84,7 @@ class Drivetrain(Guessed):
     gravity : sequence of 3 floats
         m/s^2, global components.
     run_up : float
-        Duration of the STEP over which speeds and loads come on, s.
+        Duration of the STEP over which speeds and loads come on, s; fans and drag are what the speed makes them.
     running : bool
         Whether the shafts turn at their operating speeds from the start; else from rest.
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from gearmbs.dae.equations.expressions.splines import SplineData, cubic_slopes
 from gearmbs.dae.equations.loads.forces import DISSIPATED, Diagnostic
-from gearmbs.drivetrain.part import Attached, Part, errors_named, fixed_value, over_time, require, share_of
+from gearmbs.drivetrain.part import Attached, Part, errors_named, fixed_value, over_time, require
 from gearmbs.drivetrain.torque_element import LOST, OWN, ShaftTorque, mean_of_curve, on_curve, slopes
 from gearmbs.mechanism.parts.elements import State
-from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant
+from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, step
 from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.schema.quantities import Measure, OneOf, OverTime
 from gearmbs.units import Quantity
@@ -296,7 +296,8 @@ class TableLoad(Load):
     ----------
     over : {"speed", "angle", "time"}
         Speed: a monotone cubic, beyond its ends its tangents; angle: the periodic spline over one turn; time: ADAMS's
-        CUBSPL. At the operating point the torque is that of the curve at the speed, or its mean over the table.
+        CUBSPL. At the operating point the torque is that of the curve at the speed, or its mean over the table. Over
+        speed and angle it comes on over the run-up, as numbers do; over time it is taken as it is, as expressions are.
     places : sequence of float or str
         rad/s, rad or s; increasing.
     torques : sequence of float or str
@@ -361,7 +362,7 @@ class TableLoad(Load):
         else:
             x, y, m = self._curve()
             parameters = np.concatenate([[at.sense, TURN if self.over == "angle" else 0.0, x.size], x, -y, -m])
-            times = (share_of(at),)
+            times = (step(0.0, 0.0, at.run_up, 1.0),)
         at.mechanism.add(
             ShaftTorque(
                 self.name, at.i, at.j, "table", parameters, times=times, counts_angle=self.over == "angle",

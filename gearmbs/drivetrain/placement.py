@@ -261,11 +261,12 @@ def _assembled(train: Drivetrain, last: frozenset[str]) -> Layout:
     followers = {(tie.second if forward else tie.first) for tie, forward, new in steps if new}
     for shaft in train.shafts:
         if shaft.name not in followers:
-            angles[shaft.name] = shaft.angle
+            angles[shaft.name] = shaft.angle or 0.0
     for tie, forward, new in steps:
         here, there = (tie.first, tie.second) if forward else (tie.second, tie.first)
         if tie.mesh is None:
-            angles.setdefault(there, angles[here])
+            given = train.part(there, Shaft).angle
+            angles.setdefault(there, angles[here] if given is None else given)
             continue
         _turn(train, tie, forward, new, pairs[tie.name], directions[tie.name], angles, wheels)
     for stage in train.planetary_stages:
@@ -296,6 +297,10 @@ def _turn(
     known = angles[here.shaft] + mine - direction
     wanted = direction + (pair.driven_angle(known) if forward else _driver_angle(pair, known))
     mate_pitch = 2.0 * math.pi / there.gear.teeth
+    stands = train.part(there.shaft, Shaft).angle
+    if new and stands is not None:
+        # its wheel is turned on it, as where a chain closes
+        angles[there.shaft], new = stands, False
     if new:
         own = wheels[there.name]
         if own is None:
@@ -319,7 +324,10 @@ def _turn(
         overlap = f"{mesh.label}: at the start its teeth overlap by {MM * excess:.4g} mm: the chain is closed and "
         given = [w.name for w in (there, here) if train.part(w.name, Wheel).angle is not None]
         if given:
-            raise Misfit(f"{overlap}the angles of its wheels are given; leave out the angle of wheel '{given[0]}'")
+            also = " and of its shaft" if stands is not None else ""
+            raise Misfit(
+                f"{overlap}the angles of its wheels{also} are given; leave out the angle of wheel '{given[0]}'"
+            )
         needed = excess + pair.geometry.normal_backlash
         more = needed <= LARGE_BACKLASH * abs(pair.geometry.driver.base_pitch)
         raise Misfit(

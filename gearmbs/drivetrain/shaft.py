@@ -67,8 +67,9 @@ class Shaft(Part):
     position : sequence of 3 floats, optional
         Left end in global components, m. Only one shaft of each connected group needs a place; those of the others
         follow from meshes, couplings and bearings, and where given they are checked.
-    angle : float or str
-        At the start, about its axis, rad; of a shaft that others follow.
+    angle : float or str, optional
+        At the start, about its axis, rad. Without it a shaft is turned by its mesh so that the drive flanks touch, or
+        stands as the one that it is in line with; with it the wheel of that mesh is turned on it instead.
     modes : int or "all", optional
         The shaft bends, twists and stretches: so many of its shapes between the places of its parts, the slowest, are
         kept beside the static ones by loads there; see `gearmbs.flexible.reduce_model`. Its wheels are rigid discs.
@@ -100,7 +101,7 @@ class Shaft(Part):
     mass: Annotated[Quantity, Measure("mass", above=0)] = None
     inertia: Annotated[Quantity, Measure("inertia", above=0)] = None
     position: Annotated[Three | None, Measure("length", several=3)] = None
-    angle: Annotated[Quantity, Measure("angle")] = 0.0
+    angle: Annotated[Quantity, Measure("angle")] = None
     diameter: Length = None
     modes: Any = None
     damping: Any = DAMPING

@@ -1,16 +1,17 @@
 """The torsional chain of a drivetrain: what it is when everything but rotation is rigid.
 
-M theta'' + C theta' + K theta = T, one angle a shaft. A coupling of stiffness k between shafts i and j adds k to the
-diagonal and -k beside it; a mesh of stiffness k along the line of action adds k g g^T with g = (r_b1, s r_b2) in the
-angles of its shafts, where s is 1 for external and -1 for internal pairs. A mesh of a planetary stage counts angles
-from the carrier, whose lever is therefore -(r_b1 + s r_b2); planets have angles of their own, and the carrier's inertia
-has their masses at its radius.
+M theta'' + C theta' + K theta = T, one angle a shaft, or of all shafts that rigid couplings join. A coupling of
+stiffness k between shafts i and j adds k to the diagonal and -k beside it; a mesh of stiffness k along the line of
+action adds k g g^T with g = (r_b1, s r_b2) in the angles of its shafts, where s is 1 for external and -1 for internal
+pairs. A mesh of a planetary stage counts angles from the carrier, whose lever is therefore -(r_b1 + s r_b2); planets
+have angles of their own, and the carrier's inertia has their masses at its radius.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -81,7 +82,7 @@ class TorsionalModel:
     Attributes
     ----------
     names : tuple of str
-        Shafts, then planets.
+        Shafts, then planets; of shafts in rigid couplings the first one.
     inertias : ndarray, shape (n,)
         kg m^2.
     springs : tuple of TorsionalSpring
@@ -89,6 +90,8 @@ class TorsionalModel:
         Torsional damping against the ground (of drives and loads), N m s/rad.
     held : tuple of int
         Shafts whose rotation is prescribed.
+    joined : dict of str to str
+        The name under which the others of rigid couplings are counted, by theirs.
     """
 
     names: tuple[str, ...]
@@ -96,6 +99,7 @@ class TorsionalModel:
     springs: tuple[TorsionalSpring, ...]
     ground: np.ndarray
     held: tuple[int, ...] = field(default=())
+    joined: Mapping[str, str] = field(default_factory=dict)
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return M, C and K, each (n, n)."""
@@ -152,11 +156,11 @@ class TorsionalModel:
         ndarray of complex, shape (m, n)
         """
         m, c, k = self.matrices()
-        for name in force:
-            require(name in self.names, f"response: there is no shaft '{name}'; they are {', '.join(self.names)}")
         held = list(self.held)
         free = [i for i in range(len(self.names)) if i not in self.held]
-        applied = np.array([complex(force.get(name, 0.0)) for name in self.names])
+        applied = np.zeros(len(self.names), dtype=complex)
+        for name, size in force.items():
+            applied[self._place(name, "response")] += size
         out = np.zeros((np.size(frequency), len(self.names)), dtype=complex)
         for row, f in enumerate(np.atleast_1d(frequency)):
             w = 2.0 * np.pi * f
@@ -200,11 +204,14 @@ class TorsionalModel:
 
         n = len(self.names)
         prescribed = np.zeros((n, 4))
+        motions = {self._place(name, "simulate"): one for name, one in motion.items()}
         for i in self.held:
-            require(self.names[i] in motion, f"simulate: shaft '{self.names[i]}' is prescribed; give its motion")
-            w, a, f = motion[self.names[i]]
+            require(i in motions, f"simulate: shaft '{self.names[i]}' is prescribed; give its motion")
+            w, a, f = motions[i]
             prescribed[i] = (1.0, w, a, 2.0 * np.pi * f)
-        load = np.array([torques.get(name, 0.0) for name in self.names])
+        load = np.zeros(n)
+        for name, torque in torques.items():
+            load[self._place(name, "simulate")] += torque
         rows = np.array([spring.row(n) for spring in self.springs]).reshape(-1, n)
         numbers = np.zeros((len(self.springs), 5))
         for k, spring in enumerate(self.springs):
@@ -218,11 +225,17 @@ class TorsionalModel:
         count = int(np.ceil(duration / (step * every) - 1e-9))
         out = np.empty((count + 1, 2 * n))
         state = np.zeros(2 * n)
-        held = {i: motion[self.names[i]][0] - motion[self.names[i]][1] * prescribed[i, 3] for i in self.held}
+        held = {i: motions[i][0] - motions[i][1] * prescribed[i, 3] for i in self.held}
         state[n:] = [self._rolling(i, held) for i in range(n)]
         out[0] = state
         integrate(state, self.inertias, self.ground, load, rows, numbers, prescribed, step, every, out)
         return np.arange(count + 1) * step * every, out[:, :n], out[:, n:]
+
+    def _place(self, name: str, asked_by: str) -> int:
+        """Return which inertia a shaft is, or belongs to."""
+        known = self.joined.get(name, name)
+        require(known in self.names, f"{asked_by}: there is no shaft '{name}'; they are {', '.join(self.names)}")
+        return self.names.index(known)
 
     def _rolling(self, shaft: int, known: dict[int, float]) -> float:
         """Return the speed of a shaft with which no spring between it and the prescribed shafts is stretched."""
@@ -263,14 +276,13 @@ def torsional_model(train: Drivetrain) -> TorsionalModel:
     UserWarning
         Of tilted wheels without load, whose stiffness is taken as that of parallel ones.
     """
-    names = tuple(train.turning)
-    inertias = _inertias(train, names)
+    names, place = inertias_of(train)
+    inertias = _inertias(train, names, place)
     springs = []
     for coupling in train.couplings:
-        shafts = names.index(coupling.first), names.index(coupling.second)
-        require(
-            coupling.kind != "rigid", f"{coupling.label}: a torsional chain needs an elastic coupling; make it a shaft"
-        )
+        if coupling.kind == "rigid":
+            continue
+        shafts = place[coupling.first], place[coupling.second]
         springs.append(
             TorsionalSpring(
                 coupling.name, shafts, (1.0, -1.0), coupling.tangent, coupling.tangent_damping,
@@ -280,9 +292,24 @@ def torsional_model(train: Drivetrain) -> TorsionalModel:
     springs += [train.mesh_springs[mesh.name] for mesh in train.meshings]
     ground = np.zeros(len(names))
     for drive in train.drives:
-        ground[names.index(drive.shaft)] += drive.damping()
-    held = tuple(sorted({names.index(d.shaft) for d in train.drives if isinstance(d, SpeedDrive)}))
-    return TorsionalModel(names, inertias, tuple(springs), ground, held)
+        ground[place[drive.shaft]] += drive.damping()
+    held = tuple(sorted({place[d.shaft] for d in train.drives if isinstance(d, SpeedDrive)}))
+    joined = {name: names[k] for name, k in place.items() if name != names[k]}
+    return TorsionalModel(names, inertias, tuple(springs), ground, held, joined)
+
+
+def inertias_of(train: Drivetrain) -> tuple[tuple[str, ...], dict[str, int]]:
+    """Return the names of the inertias of the chain, and which of them each shaft and planet is.
+
+    Shafts in rigid couplings are one, under the name of the first of them.
+    """
+    first = {name: name for name in train.turning}
+    for coupling in train.couplings:
+        if coupling.kind == "rigid":
+            one, two = sorted((first[coupling.first], first[coupling.second]), key=list(first).index)
+            first = {name: one if of == two else of for name, of in first.items()}
+    names = tuple(dict.fromkeys(first.values()))
+    return names, {name: names.index(of) for name, of in first.items()}
 
 
 class MeshDynamics(NamedTuple):
@@ -296,8 +323,8 @@ class MeshDynamics(NamedTuple):
         Means over a mesh cycle, in the transverse plane along the line of action, N/m and N s/m; zero without load by
         laws of another exponent than 1.
     mass : float
-        Of both shafts with their wheels there, 1 / (r_b1^2 / J_1 + r_b2^2 / J_2), kg; a shaft of prescribed speed
-        counts as held.
+        Of both shafts with their wheels there, 1 / (r_b1^2 / J_1 + r_b2^2 / J_2), kg, and with those that rigid
+        couplings join to them; a shaft of prescribed speed counts as held.
     """
 
     law: str
@@ -319,17 +346,18 @@ class MeshDynamics(NamedTuple):
 
 def mesh_dynamics(train: Drivetrain) -> dict[str, MeshDynamics]:
     """Return law, stiffness, damping and reduced mass of each mesh, by name; of stages by "sun" and "ring"."""
-    names = tuple(train.turning)
-    inertias = _inertias(train, names)
-    held = {drive.shaft for drive in train.drives if isinstance(drive, SpeedDrive)}
+    names, place = inertias_of(train)
+    inertias = _inertias(train, names, place)
+    held = [place[drive.shaft] for drive in train.drives if isinstance(drive, SpeedDrive)]
     out = {}
     for mesh in train.meshings:
         if mesh.group in out:
             # planets of a stage are alike
             continue
         spring = train.mesh_springs[mesh.name]
-        softness = [arm**2 / inertias[k] for k, arm in zip(spring.shafts, spring.levers) if names[k] not in held]
-        mass = 1.0 / sum(softness) if softness else 0.0
+        softness = spring.row(len(names)) ** 2 / inertias
+        softness[held] = 0.0
+        mass = 1.0 / softness.sum() if softness.any() else 0.0
         law = mesh_law(train, mesh.name)
         out[mesh.group] = MeshDynamics(law, float(spring.stiffness), float(spring.damping), float(mass))
     return out
@@ -375,16 +403,16 @@ def warn_of_idle_meshes(train: Drivetrain) -> None:
             )
 
 
-def _inertias(train: Drivetrain, names: tuple[str, ...]) -> np.ndarray:
+def _inertias(train: Drivetrain, names: tuple[str, ...], place: dict[str, int]) -> np.ndarray:
     """Return the moments of inertia of all shafts with their wheels, and of planets, about their axes, kg m^2."""
     inertias = np.zeros(len(names))
     for shaft in train.shafts:
-        inertias[names.index(shaft.name)] += shaft.body()[2] + sum(c.inertia[2] for c in carried(train, shaft.name))
+        inertias[place[shaft.name]] += shaft.body()[2] + sum(c.inertia[2] for c in carried(train, shaft.name))
     for planet, stage in train.planets.items():
         mass, moments = stage.weights["planet"]
-        inertias[names.index(planet)] += moments[2]
-        if stage.carrier in names:
-            carrier = names.index(stage.carrier)
+        inertias[place[planet]] += moments[2]
+        if stage.carrier in place:
+            carrier = place[stage.carrier]
             inertias[carrier] += mass * float(stage.gears.carrier_radius) ** 2
             if train.part(stage.carrier, Shaft).modes is not None:
                 inertias[carrier] += stage.weights["carrier"][1][2] / stage.gears.planets
@@ -393,8 +421,8 @@ def _inertias(train: Drivetrain, names: tuple[str, ...]) -> np.ndarray:
 
 def mesh_springs(train: Drivetrain) -> dict[str, TorsionalSpring]:
     """Return the spring of each mesh, by name; see `torsional_model`."""
-    names = tuple(train.turning)
-    return {mesh.name: _mesh_spring(train, mesh, names) for mesh in train.meshings}
+    _, place = inertias_of(train)
+    return {mesh.name: _mesh_spring(train, mesh, place) for mesh in train.meshings}
 
 
 def _carried_force(train: Drivetrain, mesh: Meshing) -> float:
@@ -408,7 +436,7 @@ def _carried_force(train: Drivetrain, mesh: Meshing) -> float:
     return abs(train.power.members[mesh.stage][member]) / (stage.gears.planets * wheel.base_radius)
 
 
-def _mesh_spring(train: Drivetrain, mesh: Meshing, names: tuple[str, ...]) -> TorsionalSpring:
+def _mesh_spring(train: Drivetrain, mesh: Meshing, place: dict[str, int]) -> TorsionalSpring:
     pair = train.pairs[mesh.name]
     geometry, law = pair.geometry, pair.contact_model
     force = _carried_force(train, mesh)
@@ -438,10 +466,10 @@ def _mesh_spring(train: Drivetrain, mesh: Meshing, names: tuple[str, ...]) -> To
         stiffness, damping = tilted, damping * tilted / stiffness
     one, two = geometry.driver.base_radius, geometry.sign * geometry.driven.base_radius
     levers = {mesh.bodies[0]: one, mesh.bodies[1]: two, mesh.carrier: -(one + two)}
-    levers = {body: lever for body, lever in levers.items() if body in names}
+    levers = {body: lever for body, lever in levers.items() if body in place}
     return TorsionalSpring(
         mesh.name,
-        tuple(names.index(body) for body in levers),
+        tuple(place[body] for body in levers),
         tuple(levers.values()),
         stiffness,
         damping,

@@ -285,6 +285,23 @@ def test_load_over_time_from_a_table():
     np.testing.assert_allclose(solution.angular_velocity("rotor")[:, 2], -2 * solution.t**2, atol=1e-5)
 
 
+@pytest.mark.parametrize("running", [True, False])
+@pytest.mark.parametrize(("over", "places"), [("speed", (-1e3, 0.0, 1e3)), ("angle", (0.0, 2.0, 4.0, 2.0 * np.pi))])
+def test_a_table_comes_on_over_the_run_up_as_numbers_do(over, places, running):
+    m, pin = rotor(0.5)
+    turning(
+        m, pin, TableLoad(name="t", shaft="r", over=over, places=places, torques=(2.0,) * len(places)), 1.0, running
+    )
+    other, axis = rotor(0.5)
+    turning(other, axis, TorqueLoad(name="t", shaft="r", torque=2.0), 1.0, running)
+    by_table, by_number = (
+        one.simulate(0.02, rate=2000, tol=1e-9).angular_velocity("rotor")[:, 2] for one in (m, other)
+    )
+    np.testing.assert_allclose(by_table, by_number, atol=1e-8)
+    # half of the first 0.01 s counts
+    assert by_table[-1] == pytest.approx(-2.0 / 0.5 * 0.015, rel=1e-6)
+
+
 @pytest.mark.parametrize(("make", "words"), [
     (lambda: InductionMotor(**{**MOTOR, "speed": "1500 rpm"}), "synchronous speed is 1500 rpm"),
     (lambda: InductionMotor(**{**MOTOR, "poles": 3}), "poles is 3"),

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.dae.problem import ModelError
+from gearmbs.drivetrain.placement import order
 from gearmbs.drivetrain.plants import resting
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.solve.analyses import static_equilibrium
@@ -119,7 +120,9 @@ def _settled(train: Drivetrain) -> Drivetrain:
 
 def _turned(train: Drivetrain, time: float) -> Drivetrain:
     """Return a drivetrain that starts where it is after a time at its operating speed, s."""
-    shafts = [replace(shaft, angle=shaft.angle + train.speeds[shaft.name] * time) for shaft in train.shafts]
+    turned = {name: train.layout.angles[name] + speed * time for name, speed in train.speeds.items()}
+    meshing = {(tie.second if forward else tie.first) for tie, forward, new in order(train) if new and tie.mesh}
+    shafts = [replace(s, angle=None if s.name in meshing else turned[s.name]) for s in train.shafts]
     return train.of_same_bodies(shafts=shafts)
 
 
