@@ -30,6 +30,11 @@ if TYPE_CHECKING:
     from gearmbs.mechanism.solve.plants import LinearPlant
 
 
+ITERATIONS = 600
+"""Most iterations on the way to a position of rest: bodies that are light beside the heaviest, as the generator beside the
+rotor of a turbine with its weight, come to rest after up to 240."""
+
+
 def resting(train: Drivetrain) -> Drivetrain:
     """Return a drivetrain at rest under the loads of its operating point, without friction, its drives holding it."""
     drives = [
@@ -71,7 +76,7 @@ def loaded(train: Drivetrain) -> tuple[Mechanism, float]:
     m = still.build()
     count_from_here(m)
     after = 2.0 * still.run_up
-    rest = static_equilibrium(m, t=after, move=True)
+    rest = static_equilibrium(m, t=after, move=True, max_iterations=ITERATIONS)
     for drive in train.drives:
         if not isinstance(drive, SpeedDrive):
             held = m.joints.pop(drive.name)

@@ -90,6 +90,19 @@ def test_rated_torques(train):
     np.testing.assert_allclose(gives, 0.238e-3, rtol=2e-3)
 
 
+@pytest.mark.parametrize("turned", [math.pi / 3, 7 * math.pi / 6])
+def test_with_its_weight_it_rests_wherever_its_carrier_stands(train, turned):
+    """The planets' forces on a sun make its torque; those that stand with their weight on it carry more or less."""
+    rest = replace(train, gravity=(0.0, -9.81, 0.0)).changed("rotor", angle=turned).at_rest
+    assert rest.trouble == ""
+    for stage in ("first", "second"):
+        forces = np.array([rest.forces[f"{stage} sun-planet {k}"] for k in (1, 2, 3)])
+        radius = train.part(stage).gears.sun.base_radius
+        assert radius * forces.sum() == pytest.approx(abs(train.power.members[stage]["sun"]), rel=1e-3)
+        shares = 3.0 * forces / forces.sum()
+        assert 0.005 < np.ptp(shares) < 0.05
+
+
 def test_energy_is_closed(train):
     """Of 50 MJ that turn 3 kJ are worked: what is lost falls with the tolerance, to 1e-5 of the work at 1e-8."""
     faster = replace(train, run_up=0.005)

@@ -17,7 +17,7 @@ import numpy as np
 
 from gearmbs.dae.problem import ModelError
 from gearmbs.drivetrain.placement import order
-from gearmbs.drivetrain.plants import resting
+from gearmbs.drivetrain.plants import ITERATIONS, resting
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.solve.analyses import static_equilibrium
 
@@ -69,7 +69,7 @@ def position_of_rest(train: Drivetrain) -> Rest:
     still = resting(train)
     mechanism = still.build()
     try:
-        rest = static_equilibrium(mechanism, t=2.0 * still.run_up).solution
+        rest = static_equilibrium(mechanism, t=2.0 * still.run_up, max_iterations=ITERATIONS).solution
     except ModelError as error:
         return Rest(trouble=str(error).rstrip("."))
     out = Rest()
