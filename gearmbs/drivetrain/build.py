@@ -10,17 +10,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from gearmbs.drivetrain.bodies import ring_seats
-from gearmbs.drivetrain.connections import Bearing, Coupling
+from gearmbs.drivetrain.connections import Bearing
+from gearmbs.drivetrain.couplings.aligned import Coupling
+from gearmbs.drivetrain.couplings.misaligned import roles
 from gearmbs.drivetrain.drives import Drive
 from gearmbs.drivetrain.housing import Housing
 from gearmbs.drivetrain.kinematics import joined
 from gearmbs.drivetrain.loads import Load
-from gearmbs.drivetrain.on_shafts import check_thrust
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, errors_named, require
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
 from gearmbs.drivetrain.planetary import PlanetaryStage, add_stage, carried, check_stage
 from gearmbs.drivetrain.shaft import Shaft
+from gearmbs.drivetrain.static.holding import check_held, check_stands
 from gearmbs.gears.geometry import MM, turn_z
 from gearmbs.gears.spec import COUNTED_TWICE, GearSpec
 from gearmbs.mechanism.mechanism import Mechanism
@@ -37,8 +39,6 @@ if TYPE_CHECKING:
 
 COAXIAL = 1e-6
 """Distance, m, up to which axes are one and faces touch without overlap: far below any gap of a drawing."""
-HELD = 1e-9
-"""Part of the largest singular value below which a motion counts as free."""
 
 
 def check(train: Drivetrain) -> None:
@@ -60,10 +60,9 @@ def check(train: Drivetrain) -> None:
     pairs = train.pairs
     places, _ = seats(train, pairs)
     _groups(train)
-    for shaft in train.shafts:
-        _held(train, shaft)
+    check_held(train, places)
     for housing in train.housings:
-        _stands(housing)
+        check_stands(housing)
     _collisions(train, places)
 
 
@@ -155,66 +154,6 @@ def _groups(train: Drivetrain) -> None:
         raise DrivetrainError(
             f"{train.name}: shafts {', '.join(map(repr, free))} are not joined: the chain is open; join them by meshes "
             "or couplings, or give all but one of them a position"
-        )
-
-
-def _held(train: Drivetrain, shaft: Shaft) -> None:
-    """The bearings of a shaft must hold its five motions but the rotation, alone or through rigid couplings."""
-    group = {shaft.name}
-    for coupling in train.couplings:
-        if coupling.kind == "rigid" and group & {coupling.first, coupling.second}:
-            group |= {coupling.first, coupling.second}
-    check_thrust(train, group)
-    if len(group) > 1:
-        return
-    mine = [b for b in train.bearings if b.shaft == shaft.name]
-    require(bool(mine), f"{shaft.label}: nothing holds it; give it a bearing")
-    ideal = [b for b in mine if b.kind == "ideal"]
-    require(
-        len(ideal) <= 2,
-        f"{shaft.label}: {len(ideal)} ideal bearings hold it more than once, so that their forces are not determined; "
-        "give two of them, or elastic ones",
-    )
-    rows = []
-    for bearing in mine:
-        z = train.station(bearing) - 0.5 * shaft.length
-        # a tilt moves the point: x by tilt y times z, y by minus tilt x times z
-        point = np.eye(5)
-        point[0, 4], point[1, 3] = z, -z
-        held = bearing.holds(len(ideal)) @ point
-        size = np.abs(held).max()
-        rows.append(held / (size if size > 0.0 else 1.0))
-    _, sizes, motions = np.linalg.svd(np.vstack(rows))
-    sizes = np.concatenate([sizes, np.zeros(5 - sizes.size)])
-    if sizes[-1] < HELD * sizes[0]:
-        names = ("move across it", "move across it", "move along its axis", "tilt", "tilt")
-        free = names[int(np.argmax(np.abs(motions[-1])))]
-        raise DrivetrainError(
-            f"{shaft.label}: its bearings {', '.join(repr(b.name) for b in mine)} leave it free to {free}; "
-            "add a bearing, or stiffness in that direction"
-        )
-
-
-def _stands(housing: Housing) -> None:
-    """The mounts of a housing of finite elements must hold its six motions, for nothing else does."""
-    if housing.model is None:
-        return
-    places = np.array([mount.at for mount in housing.mounts], dtype=float)
-    arms = places - places.mean(axis=0)
-    reach = max(float(np.abs(arms).max()), COAXIAL)
-    rows = []
-    for arm, mount in zip(arms, housing.mounts):
-        turned = np.cross(np.eye(3), arm / reach).T
-        rows.append(np.sqrt(np.asarray(mount.stiffness, dtype=float))[:, None] * np.hstack([np.eye(3), turned]))
-    _, sizes, motions = np.linalg.svd(np.vstack(rows))
-    if sizes.size < 6 or sizes[-1] < np.sqrt(HELD) * sizes[0]:
-        way = motions[-1]
-        turning = np.linalg.norm(way[3:]) > np.linalg.norm(way[:3])
-        axis = "xyz"[int(np.argmax(np.abs(way[3:] if turning else way[:3])))]
-        raise DrivetrainError(
-            f"{housing.label}: its mounts {', '.join(repr(m.name) for m in housing.mounts)} leave it free to "
-            f"{'turn about' if turning else 'move along'} {axis}; give three or more that are not on one line, with "
-            "stiffness in that direction"
         )
 
 
@@ -363,21 +302,24 @@ def build(train: Drivetrain) -> Mechanism:
     for bearing in train.bearings:
         with errors_named(bearing.label):
             builder.bearing(bearing)
+    centres = roles(train.couplings, {bearing.shaft for bearing in train.bearings})
     for coupling in train.couplings:
         one, two = (train.part(n, Shaft) for n in (coupling.first, coupling.second))
         stations = coupling.stations or (one.length, 0.0)
-        frame = layout.seats[one.name]
-        where, axes = frame.at(stations[0]), frame.axes
-        i = m.bodies[two.name].marker_at(where, axes, name=f"{coupling.name}.I")
-        j = m.bodies[one.name].marker_at(where, axes, name=f"{coupling.name}.J")
+        ends = [(shaft, layout.seats[shaft.name], z) for shaft, z in zip((two, one), stations[::-1])]
+        i, j = (
+            m.bodies[shaft.name].marker_at(seat.at(z), seat.axes, name=f"{coupling.name}.{end}")
+            for (shaft, seat, z), end in zip(ends, "IJ")
+        )
+        at = Attached(m, i, j, train.speeds[two.name], train.run_up, train.running)
         with errors_named(coupling.label):
-            coupling.add(Attached(m, i, j, train.speeds[two.name], train.run_up, train.running))
+            coupling.add(at, centres.get(coupling.name, ""))
     for mesh in train.meshes:
         m.gear_contact(mesh.name, builder.wheels[mesh.driver], builder.wheels[mesh.driven], train.pairs[mesh.name])
     for stage in train.planetary_stages:
         add_stage(m, train, layout, stage)
-    ends: tuple[Any, ...] = (*train.drives, *train.loads)
-    for part in ends:
+    outer: tuple[Any, ...] = (*train.drives, *train.loads)
+    for part in outer:
         with errors_named(part.label):
             part.add(builder.attached(part, "left" if part in train.drives else "right"))
     for sensor in train.sensors:
@@ -408,7 +350,7 @@ class _Builder:
         train, layout = self.train, self.layout
         seat = layout.seats[shaft.name]
         self._warn_of_solid_wheels(shaft)
-        spin = train.start_share * train.speeds[shaft.name]
+        spin = train.start_share * train.speeds[shaft.name] * layout.paces[shaft.name]
         where = {
             "position": seat.origin,
             "orientation": seat.axes @ turn_z(layout.angles[shaft.name]),

@@ -63,7 +63,8 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS
-from gearmbs.drivetrain.connections import BEARINGS, COUPLINGS
+from gearmbs.drivetrain.connections import BEARINGS
+from gearmbs.drivetrain.couplings.misaligned import COUPLINGS
 from gearmbs.drivetrain.drives import DRIVES
 from gearmbs.drivetrain.drivetrain import KINDS, Drivetrain
 from gearmbs.drivetrain.housing import Housing, HousingMode, Mount

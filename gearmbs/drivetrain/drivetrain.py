@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
 
 from gearmbs._lazy import Guessed
-from gearmbs.drivetrain.connections import Bearing, Coupling
+from gearmbs.drivetrain.connections import Bearing
+from gearmbs.drivetrain.couplings.aligned import Coupling
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.housing import Housing
 from gearmbs.drivetrain.loads import Load

@@ -9,6 +9,7 @@ from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
+from gearmbs.drivetrain.couplings.misaligned import UniversalJoint
 from gearmbs.drivetrain.drives import Drive, SpeedDrive
 from gearmbs.drivetrain.loads import RPM, Drag, Load, TableLoad
 from gearmbs.drivetrain.part import DrivetrainError, require
@@ -173,6 +174,9 @@ class KinematicTable:
         for mesh in self.train.meshes:
             rows.append(("mesh", mesh.name, "GMF", self.mesh_frequency(mesh.name)))
             rows.append(("mesh", mesh.name, "hunting tooth", self.hunting_frequency(mesh.name)))
+        for coupling in self.train.couplings:
+            if isinstance(coupling, UniversalJoint) and coupling.angle:
+                rows.append(("coupling", coupling.name, "2x", 2.0 * self.shaft_frequency(coupling.first)))
         for stage in self.train.planetary_stages:
             rows += self._stage_lines(stage)
         for bearing in self.train.bearings:
@@ -213,7 +217,7 @@ class KinematicTable:
         if harmonics is None:
             for row in self.lines.itertuples():
                 line = float(row.frequency)  # type: ignore[arg-type]
-                if row.kind in ("shaft", "planetary stage") or row.name == "hunting tooth" or line <= 0.0:
+                if row.kind in ("shaft", "coupling", "planetary stage") or row.name == "hunting tooth" or line <= 0.0:
                     continue
                 # the harmonics on either side; sidebands reach as far as their order
                 for h in {max(1, math.floor(frequency / line)), max(1, math.ceil(frequency / line))}:

@@ -2,7 +2,8 @@
 
 A shaft has a left end O, a frame A_0 that does not turn (z along the axis) and an angle phi about it. With D = A_0
 turned about z by a mesh's direction, the mate's wheel is at D r and tilted by D T, where r and T are those of the pair
-in its own frame (x from the driver's to the driven wheel's centre). Coaxial shafts share A_0 and phi.
+in its own frame (x from the driver's to the driven wheel's centre). Coaxial shafts share A_0 and phi; a coupling with
+an angle or an offset tilts A_0 and moves the point.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from gearmbs.drivetrain.couplings.aligned import Coupling
+from gearmbs.drivetrain.couplings.misaligned import Misaligned
 from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh, Wheel
 from gearmbs.drivetrain.planetary import PlanetaryStage, assemble_stage
@@ -58,22 +61,26 @@ class Layout:
         wheel of each planet.
     directions : dict of str to float
         Of each mesh, from the driver's A_0, rad.
+    paces : dict of str to float
+        Speed of each shaft at the start over that of its operating point: behind a universal joint it varies.
     """
 
     seats: dict[str, Seat]
     angles: dict[str, float]
     wheels: dict[str, float]
     directions: dict[str, float]
+    paces: dict[str, float]
 
 
 class Tie(NamedTuple):
-    """Something that places one shaft by another: a mesh, or what makes them coaxial."""
+    """Something that places one shaft by another: a mesh, a coupling, or what makes them coaxial."""
 
     name: str
     first: str
     second: str
     mesh: GearMesh | None
     stations: tuple[float, float]
+    coupling: Coupling | None = None
 
 
 def ties(train: Drivetrain) -> list[Tie]:
@@ -82,7 +89,7 @@ def ties(train: Drivetrain) -> list[Tie]:
     for coupling in train.couplings:
         one, two = (train.part(name, Shaft, coupling.label) for name in (coupling.first, coupling.second))
         stations = coupling.stations or (one.length, 0.0)
-        out.append(Tie(coupling.name, one.name, two.name, None, (stations[0], stations[1])))
+        out.append(Tie(coupling.name, one.name, two.name, None, (stations[0], stations[1]), coupling))
     for bearing in train.bearings:
         if bearing.on is not None and isinstance(train.parts.get(bearing.on), Shaft):
             station = train.station(bearing)
@@ -145,7 +152,7 @@ def seats(train: Drivetrain, pairs: dict[str, Any]) -> tuple[dict[str, Seat], di
     for tie, forward, _ in steps:
         here, there = (tie.first, tie.second) if forward else (tie.second, tie.first)
         if tie.mesh is None:
-            _place_coaxial(train, tie, forward, here, there, out)
+            _place_in_line(train, tie, forward, here, there, out)
             continue
         geometry = pairs[tie.name].geometry
         direction = tie.mesh.direction
@@ -161,18 +168,33 @@ def seats(train: Drivetrain, pairs: dict[str, Any]) -> tuple[dict[str, Seat], di
     return out, directions
 
 
-def _place_coaxial(train: Drivetrain, tie: Tie, forward: bool, here: str, there: str, out: dict[str, Seat]) -> None:
+def _place_in_line(train: Drivetrain, tie: Tie, forward: bool, here: str, there: str, out: dict[str, Seat]) -> None:
+    """Place a shaft in line with another one, or as its coupling says."""
     mine, theirs = tie.stations if forward else tie.stations[::-1]
-    point = out[here].at(mine)
+    point, axes = out[here].at(mine), out[here].axes
+    if tie.coupling is not None:
+        tilt, shift = tie.coupling.tilt, tie.coupling.shift
+        axes = axes @ tilt if forward else axes @ tilt.T
+        point = point + out[here].axes @ shift if forward else point - axes @ shift
     known = out.get(there)
     if known is None:
-        out[there] = Seat(point - theirs * out[here].axes[:, 2], out[here].axes)
+        out[there] = Seat(point - theirs * axes[:, 2], axes)
         return
     gap = known.at(theirs) - point
-    along = float(gap @ out[here].axes[:, 2])
-    across = float(np.linalg.norm(gap - along * out[here].axes[:, 2]))
+    along = float(gap @ axes[:, 2])
+    across = float(np.linalg.norm(gap - along * axes[:, 2]))
+    parallel = float(np.linalg.norm(known.axes[:, 2] - axes[:, 2])) <= CLOSED
+    if isinstance(tie.coupling, Misaligned):
+        off = MM * (known.at(theirs) - out[here].at(mine))
+        turned = math.degrees(math.acos(min(1.0, float(known.axes[:, 2] @ out[here].axes[:, 2]))))
+        require(
+            across <= CLOSED and parallel,
+            f"{tie.coupling.label}: shafts '{tie.first}' and '{tie.second}' are elsewhere by what they are joined with "
+            f"otherwise: their places are ({off[0]:.4g}, {off[1]:.4g}, {off[2]:.4g}) mm apart and their axes at "
+            f"{turned:.4g} deg; give its angle, direction and offset so, or leave out what places them",
+        )
     require(
-        across <= CLOSED and float(np.linalg.norm(known.axes[:, 2] - out[here].axes[:, 2])) <= CLOSED,
+        across <= CLOSED and parallel,
         f"{train.parts[tie.name].label}: shafts '{tie.first}' and '{tie.second}' are not coaxial: their axes are "
         f"{MM * across:.4g} mm apart; change their places or the meshes between them",
     )
@@ -257,21 +279,28 @@ def _assembled(train: Drivetrain, last: frozenset[str]) -> Layout:
     places, directions = seats(train, pairs)
     wheels = {wheel.name: wheel.angle for wheel in train.wheels}
     angles: dict[str, float] = {}
+    paces: dict[str, float] = {}
     steps = list(order(train, last))
     followers = {(tie.second if forward else tie.first) for tie, forward, new in steps if new}
     for shaft in train.shafts:
         if shaft.name not in followers:
             angles[shaft.name] = shaft.angle or 0.0
+            paces[shaft.name] = 1.0
     for tie, forward, new in steps:
         here, there = (tie.first, tie.second) if forward else (tie.second, tie.first)
         if tie.mesh is None:
+            stands, pace = angles[here], 1.0
+            if tie.coupling is not None:
+                stands, pace = tie.coupling.follows(stands, forward=forward)
             given = train.part(there, Shaft).angle
-            angles.setdefault(there, angles[here] if given is None else given)
+            angles.setdefault(there, stands if given is None else given)
+            paces.setdefault(there, paces[here] * pace)
             continue
+        paces.setdefault(there, paces[here])
         _turn(train, tie, forward, new, pairs[tie.name], directions[tie.name], angles, wheels)
     for stage in train.planetary_stages:
         assemble_stage(train, stage, angles, wheels)
-    return Layout(places, angles, {n: 0.0 if a is None else a for n, a in wheels.items()}, directions)
+    return Layout(places, angles, {n: 0.0 if a is None else a for n, a in wheels.items()}, directions, paces)
 
 
 def _turn(

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 
 ITERATIONS = 600
-"""Most iterations on the way to a position of rest: bodies that are light beside the heaviest, as the generator beside the
-rotor of a turbine with its weight, come to rest after up to 240."""
+"""Most iterations on the way to a position of rest: bodies that are light beside the heaviest, as a turbine's generator
+beside its rotor with their weight, come to rest after up to 240."""
 
 
 def resting(train: Drivetrain) -> Drivetrain:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import scipy.linalg
 
+from gearmbs.drivetrain.couplings.aligned import is_rigid
 from gearmbs.drivetrain.drives import SpeedDrive
 from gearmbs.drivetrain.part import errors_named, require
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, carried
@@ -280,7 +281,7 @@ def torsional_model(train: Drivetrain) -> TorsionalModel:
     inertias = _inertias(train, names, place)
     springs = []
     for coupling in train.couplings:
-        if coupling.kind == "rigid":
+        if is_rigid(coupling):
             continue
         shafts = place[coupling.first], place[coupling.second]
         springs.append(
@@ -305,7 +306,7 @@ def inertias_of(train: Drivetrain) -> tuple[tuple[str, ...], dict[str, int]]:
     """
     first = {name: name for name in train.turning}
     for coupling in train.couplings:
-        if coupling.kind == "rigid":
+        if is_rigid(coupling):
             one, two = sorted((first[coupling.first], first[coupling.second]), key=list(first).index)
             first = {name: one if of == two else of for name, of in first.items()}
     names = tuple(dict.fromkeys(first.values()))

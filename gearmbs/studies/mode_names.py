@@ -9,6 +9,7 @@ import pandas as pd
 import xarray as xr
 
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, Housing, Mount, Shaft
+from gearmbs.drivetrain.couplings.misaligned import seat_of
 from gearmbs.drivetrain.plants import loaded
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.mechanism import linear_modes
@@ -84,6 +85,7 @@ def part_kinds(train: Drivetrain) -> dict[str, str]:
               "housing": train.housings, "load": (*train.drives, *train.loads)}  # fmt: skip
     out = {part.name: kind for kind, parts in groups.items() for part in parts}
     out |= {mesh.name: "mesh" for mesh in train.meshings} | dict.fromkeys(train.pins, "bearing")
+    out |= {seat_of(coupling): "coupling" for coupling in train.couplings}
     return out | {mount.name: "mount" for housing in train.housings for mount in housing.mounts}
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
+from gearmbs.drivetrain.couplings.aligned import is_rigid
 from gearmbs.drivetrain.kinematics import Link, links, walk
 from gearmbs.drivetrain.parts import GearMesh
 from gearmbs.drivetrain.planetary import (
@@ -207,5 +208,5 @@ def _softness(train: Drivetrain, link: Link | PlanetaryStage) -> float:
         gears = part.gears
         teeth = MEAN_TEETH * gears.planets * min(gears.sun.face_width, gears.planet.face_width)
         return float(teeth**-0.5 / gears.sun.base_radius)
-    stiffness = getattr(part, "tangent", STIFF) if getattr(part, "kind", "") != "rigid" else STIFF
+    stiffness = STIFF if is_rigid(part) else getattr(part, "tangent", STIFF)
     return float(max(stiffness, 1e-12 * STIFF) ** -0.5)

@@ -122,6 +122,10 @@ def _turned(train: Drivetrain, time: float) -> Drivetrain:
     """Return a drivetrain that starts where it is after a time at its operating speed, s."""
     turned = {name: train.layout.angles[name] + speed * time for name, speed in train.speeds.items()}
     meshing = {(tie.second if forward else tie.first) for tie, forward, new in order(train) if new and tie.mesh}
+    # an angle that was not given follows behind a universal joint
+    meshing |= {c.second for c in train.couplings if c.kind == "universal"} & {
+        s.name for s in train.shafts if s.angle is None
+    }
     shafts = [replace(s, angle=None if s.name in meshing else turned[s.name]) for s in train.shafts]
     return train.of_same_bodies(shafts=shafts)
 

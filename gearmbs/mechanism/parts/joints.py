@@ -160,6 +160,7 @@ JOINTS: dict[str, JointKind] = {
     "inplane": JointKind(lambda i, j: [in_plane(i, j)], adams=("JPRIM", "INPLANE")),
     "orientation": JointKind(same_orientation, adams=("JPRIM", "ORIENTATION")),
     "parallel_axes": JointKind(parallel_z, angle=True, adams=("JPRIM", "PARALLEL_AXES")),
+    "forks": JointKind(lambda i, j: [axes_normal(i, j, X, Y)]),
     "perpendicular": JointKind(lambda i, j: [axes_normal(i, j, Z, Z)], crossed=True, adams=("JPRIM", "PERPENDICULAR")),
 }
 """The joints and primitives that need nothing but their two markers, by the name of their kind."""
