@@ -37,6 +37,7 @@ from .loads import Pump as Pump
 from .loads import TableLoad as TableLoad
 from .loads import TorqueLoad as TorqueLoad
 from .loads import gear_pump_ripple as gear_pump_ripple
+from .members.carrier import FlexibleCarrier as FlexibleCarrier
 from .part import DrivetrainError as DrivetrainError
 from .parts import SENSORS as SENSORS
 from .parts import Accelerometer as Accelerometer

@@ -9,6 +9,7 @@ import numpy as np
 
 from gearmbs.drivetrain.connections import Bearing
 from gearmbs.drivetrain.housing import MODES, Housing, Mount
+from gearmbs.drivetrain.members.carrier import carrier_models
 from gearmbs.drivetrain.part import errors_named, require
 from gearmbs.drivetrain.planetary import carried
 from gearmbs.drivetrain.shaft import ALL, Shaft
@@ -31,9 +32,10 @@ ROUND = 1.02
 
 
 def modal_models(train: Drivetrain) -> dict[str, ModalModel]:
-    """Return the bodies with modes of a drivetrain's shafts and housings that have them, by name."""
+    """Return the bodies with modes of a drivetrain's shafts, housings and carriers that have them, by name."""
     found = {shaft.name: shaft_model(train, shaft) for shaft in train.shafts if shaft.modes is not None}
-    return found | {h.name: housing_model(train, h) for h in train.housings if h.model is not None}
+    found |= {h.name: housing_model(train, h) for h in train.housings if h.model is not None}
+    return found | carrier_models(train)
 
 
 # --- shafts ---------------------------------------------------------------------------------------
@@ -44,7 +46,9 @@ def shaft_seats(train: Drivetrain, shaft: Shaft) -> dict[str, float]:
     at = [(w.name, train.station(w)) for w in train.wheels if w.shaft == shaft.name]
     for stage in train.planetary_stages:
         members = [member for member, on in stage.holders.items() if on == shaft.name]
-        at += [(f"{stage.name} {member}", stage.station(train, member)) for member in members]
+        hub = 0.0 if stage.flexible_carrier is None else stage.flexible_carrier.hub_at
+        shifts = {"carrier": hub}
+        at += [(f"{stage.name} {m}", stage.station(train, m) + shifts.get(m, 0.0)) for m in members]
     at += [(b.name, train.station(b)) for b in train.bearings if b.shaft == shaft.name]
     for bearing in train.bearings:
         if train.carrier(bearing) == shaft.name:

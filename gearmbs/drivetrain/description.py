@@ -216,7 +216,7 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None, folder: 
     if group == "meshes":
         return _mesh(where, name, settings, fault)
     if group == "planetary_stages":
-        return _stage(where, name, settings, fault)
+        return _stage(where, name, settings, fault, folder)
     if group == "housings":
         return _housing(where, name, settings, folder)
     if group == "shafts":
@@ -265,7 +265,10 @@ def _mesh(where: str, name: str, settings: dict[str, Any], fault: FaultReader | 
     return _of_kind(where, GearMesh, name, {**own, "settings": settings})
 
 
-def _stage(where: str, name: str, settings: dict[str, Any], fault: FaultReader | None) -> PlanetaryStage:
+def _stage(where: str, name: str, settings: dict[str, Any], fault: FaultReader | None, folder: Path) -> PlanetaryStage:
+    body = settings.get("carrier_body")
+    if isinstance(body, Mapping) and isinstance(body.get("model"), Mapping):
+        settings["carrier_body"] = {**body, "model": _from_folder(f"{where}.carrier_body", body["model"], folder)}
     own: dict[str, Any] = {key: settings.pop(key) for key in STAGE_KEYS if key in settings}
     check_keys(settings, [*STAGE_KEYS, *SET_KEYS], where, DrivetrainError, shown=repr)
     with errors_named(where):

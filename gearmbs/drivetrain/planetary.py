@@ -18,6 +18,7 @@ import scipy.linalg
 
 from gearmbs.drivetrain.connections import rolling_bearing
 from gearmbs.drivetrain.housing import Housing
+from gearmbs.drivetrain.members.carrier import FlexibleCarrier, add_carrier
 from gearmbs.drivetrain.part import Part, errors_named, require
 from gearmbs.drivetrain.parts import contact_law, flank_friction
 from gearmbs.drivetrain.shaft import Shaft
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain.drivetrain import Drivetrain
     from gearmbs.drivetrain.placement import Layout
     from gearmbs.mechanism.mechanism import Mechanism
-    from gearmbs.mechanism.parts.bodies import Body, Marker
+    from gearmbs.mechanism.parts.bodies import Marker
 
 Station = Annotated[Quantity, Measure("length")]
 
@@ -64,6 +65,9 @@ class PlanetaryStage(Part):
     masses : mapping, optional
         Mass, kg, and moments of inertia (or that about the axis), kg m^2, of the wheels "sun", "planet" and "ring" and
         of the "carrier", which its shaft has beside its own; default: those of `gearmbs.gears.planetary_mechanism`.
+    carrier_body : FlexibleCarrier or mapping, optional
+        How it deforms: a model of finite elements or modes, or how stiff its pins are, as a table of the fields
+        of `gearmbs.drivetrain.FlexibleCarrier`. Default: it is rigid.
 
     Raises
     ------
@@ -82,11 +86,17 @@ class PlanetaryStage(Part):
     ring_station: Station = None
     pins: Any = None
     masses: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
+    carrier_body: Any = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require(isinstance(self.gears, PlanetarySet), f"{self.label}: gears is {self.gears!r}; give a PlanetarySet")
         with errors_named(self.label):
+            body = self.flexible_carrier
+            require(
+                body is None or body.model is None or "carrier" not in self.masses,
+                "masses has carrier beside a model of it, from which they follow; leave one of them out",
+            )
             _ = self.weights
         with errors_named(f"{self.label}: pins"):
             _ = self.on_pins
@@ -94,7 +104,23 @@ class PlanetaryStage(Part):
     @cached_property
     def weights(self) -> dict[str, tuple[float, Any]]:
         """Mass (kg) and moments of inertia (kg m^2) of "sun", "planet", "ring" and "carrier"."""
-        return set_masses(self.gears, self.masses)
+        found, body = set_masses(self.gears, self.masses), self.flexible_carrier
+        return found if body is None else {**found, "carrier": body.mass(found["carrier"])}
+
+    @cached_property
+    def flexible_carrier(self) -> FlexibleCarrier | None:
+        """How the carrier deforms; None if it is rigid."""
+        return None if self.carrier_body is None else FlexibleCarrier.of(self.carrier_body)
+
+    @property
+    def carrier_name(self) -> str:
+        """Name of the carrier's body where it is one of its own."""
+        return f"{self.name} carrier"
+
+    def carrier_apart(self, train: Drivetrain) -> bool:
+        """Return whether the carrier is a body of its own: it deforms, or is on a shaft that bends."""
+        on = train.parts.get(self.carrier)
+        return self.carrier_body is not None or (isinstance(on, Shaft) and on.modes is not None)
 
     @cached_property
     def on_pins(self) -> Support | PinBearing | None:
@@ -247,7 +273,7 @@ SET_KEYS = (
     *(f.name for f in fields(PlanetarySet) if f.name not in ("sun", "planet", "ring", "planets")),
 )
 """Keys of a set in a file."""
-STAGE_KEYS = (*MEMBERS, *(f"{member}_station" for member in MEMBERS), "pins", "masses")
+STAGE_KEYS = (*MEMBERS, *(f"{member}_station" for member in MEMBERS), "pins", "masses", "carrier_body")
 """Keys of a stage in a file beside those of its set."""
 
 
@@ -327,8 +353,8 @@ def carried(train: Drivetrain, shaft: str) -> list[Carried]:
     ]
     for stage in train.planetary_stages:
         for member, on in stage.holders.items():
-            # a carrier on a shaft that bends is a body of its own
-            if on == shaft and not (member == "carrier" and train.part(on, Shaft).modes is not None):
+            # a carrier that deforms, or on a shaft that bends, is a body of its own
+            if on == shaft and not (member == "carrier" and stage.carrier_apart(train)):
                 mass, moments = stage.weights[member]
                 out.append(Carried(f"{stage.name} {member}", stage.station(train, member), mass, tuple(moments)))
     return out
@@ -562,23 +588,9 @@ def add_stage(m: Mechanism, train: Drivetrain, layout: Layout, stage: PlanetaryS
         "steps": np.array([layout.wheels[stage.planet(k)] for k in planets]),
     }
     ring = wheel("ring", layout.wheels[f"{stage.name} ring"])
-    carrier, sense = _carrier(m, train, stage, origin, axes), stage.sense(train)
+    carrier, sense = add_carrier(m, train, stage, origin, axes, carrier_angle), stage.sense(train)
     members = Members(wheel("sun", 0.0), carrier, ring, origin, axes, carrier_angle, f"{stage.name} ", sense)
     turns = {name: share * speeds[name] for name in ("carrier", "planet")}
     with errors_named(stage.label):
         gears = stage.with_rotation(train)
         add_planets(m, gears, members, start, stage.weights["planet"], turns, stage.on_pins)
-
-
-def _carrier(m: Mechanism, train: Drivetrain, stage: PlanetaryStage, origin: np.ndarray, axes: np.ndarray) -> Body:
-    """Return the body that the pins are on: of a shaft that bends a rigid one, fixed to it at the carrier's station."""
-    if stage.carrier == "ground":
-        return m.ground
-    shaft, on = m.bodies[stage.carrier], train.parts[stage.carrier]
-    if not (isinstance(on, Shaft) and on.modes is not None):
-        return shaft
-    name, spin = f"{stage.name} carrier", train.start_share * train.speeds[stage.carrier]
-    weight = stage.weights["carrier"]
-    body = m.body(name, *weight, position=origin, orientation=axes, angular_velocity=spin * axes[:, 2])
-    m.joint("fixed", f"{name} seat", body.marker(name=f"{name} seat.I"), shaft.marker_at(origin, axes, name=name))
-    return body

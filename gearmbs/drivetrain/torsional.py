@@ -22,7 +22,6 @@ from gearmbs.drivetrain.couplings.aligned import is_rigid
 from gearmbs.drivetrain.drives import SpeedDrive
 from gearmbs.drivetrain.part import errors_named, require
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, carried
-from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.stiffness import pair_stiffness
 from gearmbs.kernels.jit import njit
@@ -415,7 +414,7 @@ def _inertias(train: Drivetrain, names: tuple[str, ...], place: dict[str, int]) 
         if stage.carrier in place:
             carrier = place[stage.carrier]
             inertias[carrier] += mass * float(stage.gears.carrier_radius) ** 2
-            if train.part(stage.carrier, Shaft).modes is not None:
+            if stage.carrier_apart(train):
                 inertias[carrier] += stage.weights["carrier"][1][2] / stage.gears.planets
     return inertias
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible import ModalModel
     from gearmbs.units import QuantityLike
 
-KINDS = ("mesh", "shaft", "bearing", "coupling", "housing", "mount", "load", "other")
+KINDS = ("mesh", "shaft", "carrier", "bearing", "coupling", "housing", "mount", "load", "other")
 """What parts are, in the order of tables; drives count as loads."""
 
 MOTIONS = ("bending", "torsion", "stretching")
@@ -86,6 +86,7 @@ def part_kinds(train: Drivetrain) -> dict[str, str]:
     out = {part.name: kind for kind, parts in groups.items() for part in parts}
     out |= {mesh.name: "mesh" for mesh in train.meshings} | dict.fromkeys(train.pins, "bearing")
     out |= {seat_of(coupling): "coupling" for coupling in train.couplings}
+    out |= {stage.carrier_name: "carrier" for stage in train.planetary_stages}
     return out | {mount.name: "mount" for housing in train.housings for mount in housing.mounts}
 
 

@@ -1,0 +1,1 @@
+"""Members of planetary stages that deform."""
