@@ -130,6 +130,7 @@ def test_a_carrier_by_the_stiffness_of_its_pins_has_the_frequencies_of_springs()
     assert mine[0] < 0.9 * rigid[0]
 
 
+@pytest.mark.slow
 def test_stiff_pins_are_a_rigid_carrier():
     stiff = FlexibleCarrier(radial=1e13, tangential=1e13, tilting=1e9, damping=0.0)
     rigid = found(train(None))
@@ -206,6 +207,7 @@ def test_a_carrier_with_modes_is_that_of_its_elements_wherever_it_is_put():
         )
 
 
+@pytest.mark.slow
 def test_modes_are_called_by_the_carrier_and_shown():
     soft = FlexibleCarrier(radial=2e7, tangential=2e7)
     one = train(soft)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -196,12 +197,12 @@ COUPLINGS: dict[str, type[Coupling]] = {
 """Couplings by their ``kind``."""
 
 
-def roles(couplings: list[Coupling], held: set[str]) -> dict[str, str]:
+def roles(couplings: Sequence[Coupling], held: set[str]) -> dict[str, str]:
     """Return what the centres of universal joints hold, by name.
 
     Parameters
     ----------
-    couplings : list of Coupling
+    couplings : sequence of Coupling
         In their order.
     held : set of str
         Shafts with bearings of their own.

@@ -48,7 +48,7 @@ def check_held(train: Drivetrain, places: dict[str, Seat]) -> None:
             continue
         group = _group(train, shaft.name, {name: len(rows) > 0 for name, rows in holding.items()})
         done |= group
-        check_thrust(train, _group(train, shaft.name, {n: rows[:, 2].any() for n, rows in holding.items()}))
+        check_thrust(train, _group(train, shaft.name, {n: bool(rows[:, 2].any()) for n, rows in holding.items()}))
         if group == {shaft.name}:
             require(bool(mine), f"{shaft.label}: nothing holds it; give it a bearing")
         _check_group(train, [s for s in train.shafts if s.name in group], places, holding)
