@@ -207,7 +207,7 @@ def test_a_path_has_modes_that_stand_out():
     (path,) = identify_path(ss.lfilter([1.0], [1.0, -1.2, 0.9], x), modes=5, rate=RATE)
     (mode,) = path.modes
     assert mode.frequency == pytest.approx(RATE / (2.0 * np.pi) * np.arccos(0.6 / np.sqrt(0.9)), rel=0.01)
-    with pytest.raises(CampaignError, match=says("modes", "whole")):
+    with pytest.raises(CampaignError, match=says("modes", "0", "whole")):
         identify_path(x, modes=0, rate=RATE)
 
 
