@@ -109,7 +109,7 @@ def test_a_slow_speed_with_its_own_times_is_interpolated_to_those_of_the_others(
     assert np.allclose(signal.values[:, 0], A)
     # once each 50 samples one turn a minute more, and the last value to the end
     assert np.allclose(signal.values[:, 1], RPM + np.minimum(np.arange(COUNT) / every, COUNT // every - 1))
-    assert any("times of their own" in note for note in signal.attrs["notes"])
+    assert any("times of its own" in note for note in signal.attrs["notes"])
     assert "1 channels" in str(analyse(tmp_path / "t.csv"))
     pieces = pd.DataFrame({"t": TIME, "a": A, "t_b": TIME, "b": -A})
     pieces.to_csv(tmp_path / "same.csv", index=False)
@@ -120,8 +120,10 @@ def test_vibration_with_its_own_times_is_refused_by_name(tmp_path):
     def row(i):
         return f"{TIME[i]:.4f},{A[i]}," + (f"{2 * TIME[i]:.4f},{A[i]}" if 2 * i < COUNT else ",")
 
-    with pytest.raises(SignalFileError, match=says("b", "t_b", "file")):
+    with pytest.raises(SignalFileError, match=says("a", "b", "10000", "5000", "--channel")):
         read(tmp_path, ["t_a,a,t_b,b"], row)
+    alone = read_signal(tmp_path / "t.csv", channels=["b"])
+    assert (names(alone), alone.attrs["sampling_rate"], alone.sizes["time"]) == (["b"], RATE / 2, COUNT // 2)
 
 
 def test_a_dash_is_no_unit_and_no_heading(tmp_path):

@@ -133,6 +133,7 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
     units: dict[str, str] = {}
     labels: dict[str, str] = {}
     order: dict[str, int] = {}
+    homes: dict[str, str] = {}
     scalars: dict[str, Any] = {}
     notes: list[str] = []
     try:
@@ -160,6 +161,7 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
                     scalars.setdefault(key, item[()].item() if item.shape == () else item[...].ravel()[0].item())
                     return
                 arrays[key] = _scaled(item, notes)
+                homes[key] = name.rpartition("/")[0].replace("/", ".")
                 for owner in (item.parent, item):
                     for attr, value in owner.attrs.items():
                         if attr.lower() in ("units", "unit"):
@@ -168,6 +170,7 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
                 if names is not None:
                     table = arrays.pop(key)
                     columns = table if table.shape[0] == len(names) else table.T
+                    homes.update(dict.fromkeys(names, homes[key]))
                     arrays.update(zip(names, columns, strict=True))
                     units.update(
                         {n: units.get(f"{key}_{i + 1}", units.get(key, UNKNOWN_UNITS)) for i, n in enumerate(names)}
@@ -184,7 +187,7 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
     if scalars.get("layout") == LAYOUT:
         arrays = {key: arrays[key] for key in sorted(arrays, key=lambda key: order[key])}
         return _own(path, arrays, units, labels, scalars)
-    record = assemble(path, arrays, scalars, units, channels, rate)
+    record = assemble(path, arrays, scalars, units, channels, rate, homes)
     record.notes += notes
     return record
 

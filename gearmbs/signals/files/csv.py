@@ -12,7 +12,7 @@ import io
 import json
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +24,7 @@ import pandas as pd
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.labview import read_lvm
-from gearmbs.signals.files.own_clocks import on_first_clock, own_clocks
+from gearmbs.signals.files.own_clocks import on_one_clock, own_clocks
 from gearmbs.signals.files.scopes import scope_layout
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
 from gearmbs.signals.files.text_tables import (
@@ -51,18 +51,16 @@ from gearmbs.signals.signal.record import (
     checked_gaps,
     chosen_rate,
     number_of,
+    rate_by_times,
     rate_candidates,
-    rate_from_times,
     speed_of,
 )
-from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
+from gearmbs.signals.signal.signal import ROUNDED_TIMES, UNKNOWN_UNITS, check_teeth
 from gearmbs.wording import warn
 
 CHUNK_ROWS = 1 << 17
 # Times are written with few digits; beyond this many samples a gap is a gap.
 MAX_JUMP = 2.0
-ROUNDED_TIMES = 0.01
-"""Relative difference up to which the mean rate of rounded times is the rate that is given."""
 # pandas before 3.1 rounds the last bit unless told otherwise; later versions are exact and warn at the option.
 EXACT: dict[str, Any] = (
     {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
@@ -101,10 +99,12 @@ def read_csv(
     rate: float | None = None,
     gaps: str | None = None,
     pulses: bool = False,
+    channels: Sequence[str] | None = None,
 ) -> Record:
     """Read a text table; `packed` for gzip. A known `rate` (Hz) stands in for times that are only rounded.
 
-    Of ``pulses`` a first column that rises evenly is one as the others.
+    Of ``pulses`` a first column that rises evenly is one as the others. Where columns have times of their own, those
+    of the `channels` that are asked for count.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def read_csv(
         clocks: list[np.ndarray | None] = []
         for values, stamped, fraction in _blocks(path, packed, layout, gaps):
             blocks.append(values)
-            clocks.append(times.seconds(values, stamped))
+            clocks.append(None if layout.groups else times.seconds(values, stamped))
             if progress is not None:
                 progress(fraction, "reading")
         if not blocks:
@@ -129,11 +129,14 @@ def read_csv(
         known = [clock for clock in clocks if clock is not None]
         clock = np.concatenate(known) if known else None
         values = np.concatenate(blocks)
-        said = [] if pulses else _bridged(path, values, layout, gaps)
+        count, said = len(values), []
         if layout.groups:
-            said += on_first_clock(path, values, layout.groups, layout.names, layout.units)
+            one = on_one_clock(path, values, layout.groups, layout.names, layout.units, channels, gaps)
+            values, clock, said = one.values, one.times, one.said
+            layout = replace(layout, groups=(), clock=one.clock, beside=(*layout.beside, *one.left_out))
+        said += [] if pulses else _bridged(path, values, layout, gaps)
         found = _record(path, values, clock, layout, rate)
-        said += _end_checked(path, packed, layout, len(found.values))
+        said += _end_checked(path, packed, layout, count)
         return replace(found, notes=[*found.notes, *said]) if said else found
 
 
@@ -235,8 +238,6 @@ def _bridged(path: Path, values: np.ndarray, layout: CsvLayout, gaps: str | None
     """
     said = []
     for i in layout.slow:
-        if i in layout.own:
-            continue
         there = np.flatnonzero(np.isfinite(values[:, i]))
         lost = len(values) - there.size
         if not lost or not there.size:
@@ -285,7 +286,8 @@ def _layout(path: Path, packed: bool, pulses: bool = False) -> CsvLayout:
         raise SignalFileError(path, "holds binary data, not text; is it in another format?")
     layout = scope_layout(head) or find_layout(head, path)
     groups = () if pulses or layout.stamps else own_clocks(layout.names, layout.units)
-    return replace(layout, groups=groups, clock=groups[0].clock, index=None) if groups else layout
+    clocks = [clock for clock, _ in groups]
+    return replace(layout, groups=groups, index=None if layout.index in clocks else layout.index)
 
 
 class _Pointed(io.TextIOBase):
@@ -353,7 +355,7 @@ def _record(
     t0 = number_of(layout.meta.get("t0"))
     start = 0.0 if t0 is None else t0[0]
     notes = list(layout.notes)
-    dropped = {*layout.stamps, *layout.empty, *layout.beside, *(clock for clock, _ in layout.groups)}
+    dropped = {*layout.stamps, *layout.empty, *layout.beside}
     dropped |= set() if layout.clock is None else {layout.clock}
     if layout.index is not None:
         # a heading that means rows is believed sooner than none or any other
@@ -378,7 +380,7 @@ def _record(
     said: list[str] = []
     if clock is not None and len(clock) > 1:
         start = float(clock[0])
-        by_clock = _clock_rate(path, clock, given, bool(candidates))
+        by_clock = rate_by_times(clock, path, given, bool(candidates))
         if by_clock is not None and candidates:
             sure = [c for c in candidates if not c.weak]
             candidates = [*sure, RateCandidate("the column of times", by_clock), *(c for c in candidates if c.weak)]
@@ -408,21 +410,6 @@ def _record(
         attrs if isinstance(attrs, dict) else {},
         [*notes, *said, *more],
     )
-
-
-def _clock_rate(path: Path, clock: np.ndarray, given: float | None, others: bool) -> float | None:
-    """Rate of a column of times; where they are only rounded, the given one, or none if the header names one."""
-    try:
-        return rate_from_times(clock, path)
-    except SignalFileError:
-        span = float(clock[-1] - clock[0])
-        mean = (clock.size - 1) / span if span > 0.0 else 0.0
-        rising = bool(np.all(np.diff(clock) >= 0.0))
-        if given is not None and rising and abs(mean - given) <= ROUNDED_TIMES * given:
-            return given
-        if others and rising:
-            return None
-        raise
 
 
 def write_csv(record: Record, path: Path, packed: bool, progress: Progress | None = None) -> None:
@@ -487,7 +474,7 @@ def _format(packed: bool, contents: dict[str, Content], also: tuple[str, ...] = 
     def read(path: Path, asked: Asked) -> Record:
         if asked.content == "lvm":
             return read_lvm(path, asked.rate)
-        return read_csv(path, packed, asked.progress, asked.rate, asked.gaps, asked.pulses)
+        return read_csv(path, packed, asked.progress, asked.rate, asked.gaps, asked.pulses, asked.channels)
 
     def pieces(path: Path, asked: Asked) -> Iterator[tuple[Record, float]] | None:
         if asked.content == "lvm":

@@ -17,7 +17,15 @@ from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.table import Content, Format, begins_with
 from gearmbs.signals.files.text_tables import decoded
 from gearmbs.signals.signal.labels import SLOW_ROLES, SLOW_SAID, role_of
-from gearmbs.signals.signal.record import Record, chosen_rate, rate_candidates, rate_from_times, same_rate, speed_of
+from gearmbs.signals.signal.record import (
+    Record,
+    chosen_rate,
+    rate_candidates,
+    rate_from_times,
+    same_rate,
+    same_start,
+    speed_of,
+)
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 
 END = "***End_of_Header***"
@@ -28,8 +36,6 @@ LEAD_IN = 28
 INCOMPLETE = 0xFFFFFFFFFFFFFFFF
 OF_FREQUENCY = ("hz", "khz", "rpm")
 """Units of the abscissa of what is no record over time."""
-SAME_START = 0.5
-"""Samples by which channels of one record may begin at other times."""
 
 
 def read_lvm(path: Path, rate: float | None = None) -> Record:
@@ -239,16 +245,6 @@ def _is_slow(channel: Any) -> bool:
     return role_of(channel.name, _unit_of(channel)) in SLOW_ROLES
 
 
-def _check_starts(path: Path, starts: dict[str, float], rate: float | None) -> None:
-    """Refuse channels that begin at different times (s): row by row their samples are not of one instant."""
-    first, last = min(starts.values()), max(starts.values())
-    if rate is not None and (last - first) * rate > SAME_START:
-        listed = ", ".join(f"{name} at {start - first:g} s" for name, start in starts.items())
-        raise SignalFileError(
-            path, f"its channels begin at different times: {listed}; choose with channels=[...] (--channel)"
-        )
-
-
 def _start_of(channel: Any) -> float:
     """Return when a channel begins, s: its own time and what it is offset by."""
     stamp = channel.properties.get("wf_start_time")
@@ -286,7 +282,7 @@ def _record(
         notes += [note for note in said if note not in notes]
     rate = same_rate(path, rates)
     if starts:
-        _check_starts(path, starts, rate)
+        same_start(path, starts, rate)
     if speed is None:
         speed, said = speed_of({**root, **dict(file[kept[0].group_name].properties)})
         notes += said

@@ -9,20 +9,33 @@ from typing import Any
 import numpy as np
 
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.signal.labels import SLOW_ROLES, SLOW_SAID, SUFFIX, rises_evenly, role_of, tells_time
+from gearmbs.signals.files.own_clocks import checked_same, interpolated
+from gearmbs.signals.signal.labels import (
+    CLOCK_NAMES,
+    SLOW_ROLES,
+    SLOW_SAID,
+    may_be_times,
+    rises_evenly,
+    role_of,
+    tells_time,
+    words_of,
+)
 from gearmbs.signals.signal.record import (
-    SECONDS,
+    AGREE,
+    SAME_START,
     RateCandidate,
     Record,
     chosen_rate,
+    mean_rate,
     number_of,
     own_header,
+    rate_by_times,
     rate_candidates,
-    rate_from_times,
     same_rate,
     speed_of,
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
+from gearmbs.signals.signal.times import in_seconds
 
 
 def assemble(
@@ -32,16 +45,19 @@ def assemble(
     units: Mapping[str, str],
     channels: Sequence[str] | None,
     given: float | None = None,
+    homes: Mapping[str, str] | None = None,
 ) -> Record:
     """Make a record of the named arrays of a file that is not laid out by this package.
 
     The arrays of the common length become channels, matrices one channel per column; an array called time gives the
     rate, as does a scalar with a name such as fs, sr or XInc (`gearmbs.signals.signal.record`), beside the channel,
     above it or, if there is none, anywhere. With `channels`, only the arrays they name (or whose columns they name)
-    count. A rate that the caller has `given` (Hz) decides where the file names two.
+    count. A rate that the caller has `given` (Hz) decides where the file names two. `homes` are the groups of the
+    arrays, by default what stands before the last dot of their names: times beside an array are its own.
     """
+    homes = {} if homes is None else homes
     told = {k: units.get(k, UNKNOWN_UNITS) for k in arrays}
-    clocks = [k for k, v in arrays.items() if tells_time(k.rsplit(".", 1)[-1], told[k]) and v.size > 1]
+    clocks = _clocks(arrays, told, homes, channels)
     columns: dict[str, np.ndarray] = {}
     column_units: dict[str, str] = {}
     owner: dict[str, str] = {}
@@ -69,7 +85,12 @@ def assemble(
                 owner[name] = key
     if not columns:
         raise SignalFileError(path, f"holds no numeric record{_among(arrays, channels)}")
-    slow, said = _slow_ones_stretched(columns, column_units)
+    own: dict[str, np.ndarray] = {}
+    for name, key in owner.items():
+        times = _clock_of(path, name, _own_times(key, columns[name].size, clocks, homes), given)
+        if times is not None and times.dtype.kind in "fiu":
+            own[name] = times
+    slow, said = _slow_ones_stretched(path, columns, column_units, own)
     notes += said
     lengths = {name: column.size for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
@@ -84,19 +105,19 @@ def assemble(
         rates[name], said = chosen_rate(path, rate_candidates(own_header(scalars, key)), given)
         notes += [note for note in said if note not in notes]
     rate = same_rate(path, rates)
-    count = next(iter(lengths.values()))
+    fast = {name: own[name] for name in columns if name in own and name not in slow}
+    checked_same(path, fast)
     t0 = 0.0
-    times = next((_seconds(k, told[k]) * arrays[k].ravel() for k in clocks if arrays[k].size == count), abscissa)
-    times = times if times is None or times.size == count else None
-    if times is not None and np.asarray(times).dtype.kind in "fiu":
+    times = next(iter(fast.values()), abscissa)
+    if times is not None and times.size == next(iter(lengths.values())) and times.dtype.kind in "fiu":
         t0 = float(times[0])
         rate, said = _rate_beside_times(path, rate, times, given)
         notes += said
     known = {k: v for k, v in scalars.items() if not isinstance(v, (list, dict))}
     speed, said = speed_of(known)
-    own = number_of(scalars.get("speed"))
-    if speed is None and own is not None and not own[1]:
-        speed = own[0]
+    plain = number_of(scalars.get("speed"))
+    if speed is None and plain is not None and not plain[1]:
+        speed = plain[0]
     counts = scalars.get("teeth")
     if isinstance(counts, str):
         counts = None if number_of(counts) is None else number_of(counts)[0]  # type: ignore[index]
@@ -117,48 +138,120 @@ def assemble(
     )
 
 
-def _seconds(name: str, unit: str) -> float:
-    """Return how many seconds the unit of a column of times is, by its label or at the end of its name."""
-    named = SUFFIX.search(name.rsplit(".", 1)[-1])
-    low = unit.strip().lower()
-    return (
-        SECONDS.get(low, 1.0)
-        if low not in ("", UNKNOWN_UNITS) or named is None
-        else SECONDS.get(named[1].lower(), 60.0)
+def _clocks(
+    arrays: Mapping[str, np.ndarray], units: Mapping[str, str], homes: Mapping[str, str], channels: Sequence[str] | None
+) -> dict[str, np.ndarray]:
+    """Return the arrays that hold times, in s: those called as times are, and those with such a word that rise."""
+    flat = {key: np.asarray(array).ravel() for key, array in arrays.items() if array.size > 1}
+    last = {key: _bare(key, homes) for key in flat}
+    named = {key for key in flat if tells_time(last[key], units[key])}
+    named |= {
+        key
+        for key, times in flat.items()
+        if key not in named and key not in (channels or ()) and may_be_times(last[key], units[key])
+        if np.squeeze(arrays[key]).ndim == 1 and times.dtype.kind in "fiu" and bool(np.all(np.diff(times) > 0))
+    }
+    begin: dict[str, float] = {}
+    # those of a file that holds times since 1970 begin together
+    for key in sorted(named):
+        begin[units[key]] = min(begin.get(units[key], np.inf), float(flat[key][0]))
+    return {key: in_seconds(flat[key], units[key], last[key], begin[units[key]]) for key in flat if key in named}
+
+
+def _bare(key: str, homes: Mapping[str, str]) -> str:
+    """Return the name of an array within its group."""
+    home = homes.get(key, key.rpartition(".")[0])
+    return key.removeprefix(f"{home}.") if home else key
+
+
+def _own_times(
+    key: str, size: int, clocks: Mapping[str, np.ndarray], homes: Mapping[str, str]
+) -> dict[str, np.ndarray]:
+    """Return the times that an array may have: those beside it or above it, or else any; the ones called alike."""
+    home = homes.get(key, key.rpartition(".")[0])
+    found: dict[str, np.ndarray] = {}
+    fitting = {name: times for name, times in clocks.items() if times.size == size}
+    while not found:
+        found = {name: times for name, times in fitting.items() if homes.get(name, name.rpartition(".")[0]) == home}
+        if not home:
+            break
+        home = home.rpartition(".")[0]
+    found = found or fitting
+    own = set(words_of(_bare(key, homes)))
+    rest = {name: [w for w in words_of(_bare(name, homes)) if w not in CLOCK_NAMES] for name in found}
+    most = max((len(words) for words in rest.values() if own.issuperset(words)), default=0)
+    alike = {name: times for name, times in found.items() if len(rest[name]) == most and own.issuperset(rest[name])}
+    return alike or found
+
+
+def _clock_of(path: Path, name: str, possible: Mapping[str, np.ndarray], given: float | None) -> np.ndarray | None:
+    """Return the times of a channel, if the possible ones are of one rate and start, or one is of the given rate."""
+    distinct: dict[str, np.ndarray] = {}
+    for clock, times in possible.items():
+        if all(not _same(times, other) for other in distinct.values()):
+            distinct[clock] = times
+    if len(distinct) < 2:
+        return next(iter(distinct.values()), None)
+    rates = {clock: mean_rate(times) for clock, times in distinct.items()}
+    told = [clock for clock, rate in rates.items() if given is not None and abs(rate / given - 1.0) <= AGREE]
+    if len(told) == 1:
+        return distinct[told[0]]
+    listed = ", ".join(f"{clock} ({rates[clock]:g} Hz from {times[0]:g} s)" for clock, times in distinct.items())
+    raise SignalFileError(
+        path,
+        f"holds several times that may be those of {name}: {listed}; say which with rate=... (--rate), or name them "
+        "alike, as t_a beside a",
     )
+
+
+def _same(times: np.ndarray, other: np.ndarray) -> bool:
+    step = abs(float(other[-1] - other[0])) / max(1, other.size - 1)
+    return bool(np.allclose(times[[0, -1]], other[[0, -1]], rtol=0.0, atol=SAME_START * step))
 
 
 def _rate_beside_times(
     path: Path, rate: float | None, times: np.ndarray, given: float | None
-) -> tuple[float, list[str]]:
+) -> tuple[float | None, list[str]]:
     """Return the rate of a file that holds times and perhaps names a rate; where they disagree the given one."""
-    try:
-        by_times = rate_from_times(times, path)
-    except SignalFileError:
-        if rate is None:
-            raise
-        return rate, []
-    if rate is None:
-        return by_times, []
+    by_times = rate_by_times(times, path, given, others=rate is not None)
+    if rate is None or by_times is None:
+        return by_times if rate is None else rate, []
     both = [RateCandidate("the sampling rate that it names", rate), RateCandidate("its column of times", by_times)]
     chosen, said = chosen_rate(path, both, given)
     return rate if chosen is None else chosen, said
 
 
-def _slow_ones_stretched(columns: dict[str, np.ndarray], units: Mapping[str, str]) -> tuple[list[str], list[str]]:
-    """Bring speeds and temperatures of fewer samples to the length of all others in place; which, and what to say."""
+def _slow_ones_stretched(
+    path: Path,
+    columns: dict[str, np.ndarray],
+    units: Mapping[str, str],
+    clocks: Mapping[str, np.ndarray],
+) -> tuple[list[str], list[str]]:
+    """Bring speeds and temperatures of other times to those of all others in place; which, and what to say."""
     slow = {name for name in columns if role_of(name, units[name]) in SLOW_ROLES}
     sizes = {column.size for name, column in columns.items() if name not in slow}
     if len(sizes) != 1:
         return [], []
     (size,) = sizes
-    shorter = [name for name in columns if name in slow and 1 < columns[name].size < size]
-    notes = []
-    for name in shorter:
+    base = next((clocks[name] for name in columns if name not in slow and name in clocks), None)
+    stretched, notes = [], []
+    for name in columns:
         own = np.asarray(columns[name], dtype=float)
-        notes.append(SLOW_SAID.format(name=name, size=size))
-        columns[name] = np.interp(np.linspace(0.0, 1.0, size), np.linspace(0.0, 1.0, own.size), own)
-    return shorter, notes
+        if name not in slow or own.size < 2:
+            continue
+        times = clocks.get(name)
+        if base is not None and times is not None:
+            if own.size == size and _same(times, base):
+                continue
+            columns[name], words = interpolated(path, name, base, times, own)
+        elif own.size < size:
+            words = SLOW_SAID.format(name=name, size=size)
+            columns[name] = np.interp(np.linspace(0.0, 1.0, size), np.linspace(0.0, 1.0, own.size), own)
+        else:
+            continue
+        stretched.append(name)
+        notes.append(words)
+    return stretched, notes
 
 
 def _among(arrays: Mapping[str, np.ndarray], channels: Sequence[str] | None) -> str:

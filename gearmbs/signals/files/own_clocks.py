@@ -1,118 +1,195 @@
-"""Columns of a table that have times of their own, beside others: a speed each tenth of a second beside vibration.
+"""Channels with times of their own, in tables and among arrays: a speed each tenth of a second beside vibration.
 
-The first column of times is that of the columns up to the next one, and so on. Speeds, temperatures and the like are
-interpolated to the times of the first columns; vibration at other times is refused by name.
+Speeds, temperatures and percents are interpolated to the times of the others. Vibration at other times, whether of
+another rate or from another start, is refused by name; chosen alone it is read with its own.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.signal.labels import CLOCK_NAMES, PARTS_OF_TIME, SUFFIX, folded, role_of
-from gearmbs.signals.signal.signal import UNKNOWN_UNITS
+from gearmbs.signals.signal.labels import may_be_times, role_of, words_of
+from gearmbs.signals.signal.record import REMEDY, checked_gaps, mean_rate, same_rate, same_start
+from gearmbs.signals.signal.times import in_seconds
 
-FACTORS = {
-    "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "hr": 3600.0,
-    "day": 86400.0, "days": 86400.0,
-}  # fmt: skip
-"""s of units of times."""
+STRETCHED = ("speed", "temperature", "share")
+"""What is interpolated to the times of the others."""
 FEWEST = 2
 """Times that a column has at least."""
+COVERED = 0.5
+"""Share of the record over which a slow channel must be known."""
+NUMBERS_ROWS = frozenset(("", "index", "idx", "nr", "no", "row", "sample", "unnamed"))
 
 
 class Group(NamedTuple):
-    """A column of times, and those behind it that it is of."""
+    """A column of times, and those that it is of."""
 
     clock: int
     columns: tuple[int, ...]
 
 
 def own_clocks(names: Sequence[str], units: Sequence[str]) -> tuple[Group, ...]:
-    """Return the groups of columns with times of their own behind a first one; empty where there are none.
+    """Return the groups of columns with times of their own; empty where there are not several.
+
+    Each column of times is that of the columns behind it up to the next one; where the last column is one and the first
+    is none, of those before it.
 
     Parameters
     ----------
     names, units : sequence of str
         Of all columns.
     """
-    at = [i for i, (name, unit) in enumerate(zip(names, units, strict=True)) if _is_time(name, unit)]
-    if len(at) < 2 or at[0] != 0:
+    at = [i for i, (name, unit) in enumerate(zip(names, units, strict=True)) if may_be_times(name, unit)]
+    first = next((i for i, name in enumerate(names) if "".join(words_of(name)) not in NUMBERS_ROWS), 0)
+    if len(at) < 2 or (at[0] != first and at[-1] != len(names) - 1):
         return ()
-    ends = [*at[1:], len(names)]
-    groups = [Group(a, tuple(range(a + 1, b))) for a, b in zip(at, ends, strict=True)]
+    if at[0] == first:
+        groups = [Group(a, tuple(range(a + 1, b))) for a, b in zip(at, [*at[1:], len(names)], strict=True)]
+    else:
+        groups = [Group(b, tuple(range(a + 1, b))) for a, b in zip([first - 1, *at[:-1]], at, strict=True)]
     # columns of times alone are those of pulses
     return tuple(groups) if all(group.columns for group in groups) else ()
 
 
-def _is_time(name: str, unit: str) -> bool:
-    words = re.split(r"[\W_]+", re.sub(r"\d+", " ", folded(name)).strip())
-    low = unit.strip().lower()
-    return not CLOCK_NAMES.isdisjoint(words) and (low in ("", UNKNOWN_UNITS) or low in PARTS_OF_TIME)
+class OneClock(NamedTuple):
+    """The rows of a table at the times of one of its columns.
+
+    Attributes
+    ----------
+    values : ndarray of shape (n, columns)
+    times : ndarray of shape (n,)
+        s.
+    clock : int
+        Column of these times.
+    left_out : tuple of int
+        Columns that are of no use here.
+    said : list of str
+    """
+
+    values: np.ndarray
+    times: np.ndarray
+    clock: int
+    left_out: tuple[int, ...]
+    said: list[str]
 
 
-def _seconds(name: str, unit: str) -> float:
-    """Return the s of a unit of times, or of that behind a name's underscore."""
-    named = SUFFIX.search(name)
-    return FACTORS.get(unit.lower(), FACTORS.get(named.group(1).lower(), 1.0) if named else 1.0)
-
-
-def on_first_clock(
-    path: Path, values: np.ndarray, groups: Sequence[Group], names: Sequence[str], units: Sequence[str]
-) -> list[str]:
-    """Interpolate columns with times of their own to those of the first, in place.
+def on_one_clock(
+    path: Path,
+    values: np.ndarray,
+    groups: Sequence[Group],
+    names: Sequence[str],
+    units: Sequence[str],
+    channels: Collection[str] | None = None,
+    gaps: str | None = None,
+) -> OneClock:
+    """Bring the columns of a table, or those of the channels asked for, to the times of one of its columns.
 
     Parameters
     ----------
     path : Path
         For messages.
     values : ndarray of shape (n, columns)
-        Rows that a slow column does not fill are nan.
+        Rows that a shorter group does not fill are nan.
     groups : sequence of Group
     names, units : sequence of str
-
-    Returns
-    -------
-    list of str
-        What is to be said.
+    channels : collection of str, optional
+    gaps : str, optional
+        What to do with gaps; see `read_signal`.
 
     Raises
     ------
     SignalFileError
-        If times do not rise, or vibration has others than the first.
+        If times do not rise, or vibration has several rates, starts or lengths.
     """
-    first = values[:, groups[0].clock]
-    said = []
-    for clock, columns in groups[1:]:
-        there = np.flatnonzero(np.isfinite(values[:, clock]))
-        values[:, clock] *= _seconds(names[clock], units[clock]) / _seconds(
-            names[groups[0].clock], units[groups[0].clock]
+    asked = [Group(g.clock, tuple(i for i in g.columns if channels is None or names[i] in channels)) for g in groups]
+    kept = [group for group in asked if group.columns] or list(groups)
+    vibration = {g: [i for i in g.columns if role_of(names[i], units[i]) not in STRETCHED] for g in kept}
+    fast = [group for group in kept if vibration[group]] or kept[:1]
+    base = fast[0]
+    times: dict[Group, np.ndarray] = {}
+    for group in [base, *kept]:
+        same = units[group.clock] == units[base.clock]
+        times[group] = _times(path, values, group, names, units, values[0, base.clock] if same else None)
+    checked_same(path, {names[i]: times[group] for group in fast for i in vibration[group] or group.columns})
+    count = times[base].size
+    out, said = values[:count].copy(), []
+    for group in kept:
+        own = times[group]
+        whole = own.size == count and np.array_equal(own, times[base])
+        for i in group.columns:
+            column = values[: own.size, i]
+            there = np.isfinite(column)
+            if whole or (group in fast and i in vibration[group]):
+                if checked_gaps(gaps) == "refuse" and not there.all() and i in vibration[group]:
+                    row = int(np.argmin(there)) + 1
+                    raise SignalFileError(path, f"row {row} holds nothing in column {names[i]!r}; {REMEDY}")
+                continue
+            out[:, i], words = interpolated(path, names[i], times[base], own[there], column[there])
+            said.append(words)
+    used = {i for group in kept for i in group.columns} | {base.clock}
+    grouped = {i for group in groups for i in (group.clock, *group.columns)}
+    return OneClock(out, times[base], base.clock, tuple(sorted(grouped - used)), said)
+
+
+def _times(
+    path: Path, values: np.ndarray, group: Group, names: Sequence[str], units: Sequence[str], origin: float | None
+) -> np.ndarray:
+    """Return the times of a group in s, as far as its rows go."""
+    column = values[:, group.clock]
+    there = np.flatnonzero(np.isfinite(column))
+    name = names[group.clock]
+    if there.size < FEWEST or there[-1] != there.size - 1 or np.any(np.diff(column[: there.size]) < 0.0):
+        raise SignalFileError(path, f"{name!r} holds no times that rise; mend it, or leave its columns out of the file")
+    return in_seconds(column[: there.size], units[group.clock], name, origin)
+
+
+def checked_same(path: Path, times: Mapping[str, np.ndarray]) -> None:
+    """Refuse channels whose own times (s, by channel) differ in rate, start or number."""
+    rates: dict[str, float | None] = {name: mean_rate(own) for name, own in times.items()}
+    rate = same_rate(path, rates)
+    same_start(path, {name: float(own[0]) for name, own in times.items()}, rate)
+    if len({own.size for own in times.values()}) > 1:
+        listed = ", ".join(f"{name} ({own.size})" for name, own in times.items())
+        raise SignalFileError(
+            path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
         )
-        times = values[there, clock]
-        if times.size == first.size and np.array_equal(times, first):
-            continue
-        if times.size < FEWEST or np.any(np.diff(times) <= 0.0):
-            raise SignalFileError(path, f"{names[clock]!r} holds no times that rise; leave it out of the file")
-        named = ", ".join(repr(names[i]) for i in columns)
-        other = [names[i] for i in columns if role_of(names[i], units[i]) not in ("speed", "temperature", "share")]
-        if other:
-            raise SignalFileError(
-                path,
-                f"{other[0]!r} has times of its own in {names[clock]!r}, {times.size} of {first.size} rows; put "
-                f"{named} into a file of their own",
-            )
-        for i in columns:
-            good = there[np.isfinite(values[there, i])]
-            if good.size < FEWEST:
-                raise SignalFileError(path, f"{names[i]!r} holds nothing beside {names[clock]!r}; leave both out")
-            values[:, i] = np.interp(first, values[good, clock], values[good, i])
-        said.append(
-            f"{named}: {times.size} values at times of their own in {names[clock]!r}, up to {times[-1]:.6g}; between "
-            f"them interpolated to the {first.size} of {names[groups[0].clock]!r}."
+
+
+def interpolated(
+    path: Path, name: str, base: np.ndarray, times: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, str]:
+    """Return a slow channel at the times of the others, and what is to be said of it; its ends hold.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+    base, times : ndarray
+        Times of the others and its own, s.
+    values : ndarray
+        Its own.
+
+    Raises
+    ------
+    SignalFileError
+        If less than half of the record is covered by its own times.
+    """
+    if times.size < FEWEST:
+        raise SignalFileError(path, f"{name!r} holds less than {FEWEST} values beside its times; leave it out")
+    span = f"{times[0]:.6g} to {times[-1]:.6g} s"
+    step = float(np.median(np.diff(times)))
+    held = max(times[0] - base[0], base[-1] - times[-1])
+    if min(times[-1] + step, base[-1]) - max(times[0] - step, base[0]) < COVERED * (base[-1] - base[0]):
+        raise SignalFileError(
+            path,
+            f"{name!r} is known from {span}, the others go from {base[0]:.6g} to {base[-1]:.6g} s; cut the record, or "
+            "choose with channels=[...] (--channel) without it",
         )
-    return said
+    ends = f"; it is known from {span} only, its ends hold" if held > 2.0 * step else ""
+    words = f"{name} has times of its own, {times.size} of them; between them it is interpolated{ends}."
+    return np.interp(base, times, values), words

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.files.own_clocks import FACTORS, Group
+from gearmbs.signals.files.own_clocks import Group
 from gearmbs.signals.signal.labels import (
     is_clock,
     is_unit_of_column,
@@ -27,6 +27,7 @@ from gearmbs.signals.signal.labels import (
     unique_names,
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
+from gearmbs.signals.signal.times import EPOCHS, LARGEST, SECONDS, seconds_of
 from gearmbs.wording import of_adams
 
 HEAD_LINES = 400
@@ -83,7 +84,7 @@ class CsvLayout:
     beside : tuple of int
         Columns of words beside the table, of no use.
     groups : tuple of Group
-        Where columns have times of their own: each column of times, the first one of the table's, with its others.
+        Where columns have times of their own: each column of times with its others.
     """
 
     first: int
@@ -103,14 +104,15 @@ class CsvLayout:
 
     @property
     def own(self) -> tuple[int, ...]:
-        """Columns with times of their own, and these."""
-        return tuple(i for clock, columns in self.groups[1:] for i in (clock, *columns))
+        """Columns with times of their own, and these, which may end before others."""
+        return tuple(i for clock, columns in self.groups for i in (clock, *columns))
 
     @property
     def slow(self) -> tuple[int, ...]:
         """Columns of speeds, pulses and temperatures, which may be written in some rows only; and `own`."""
         named = zip(self.names, self.units, strict=True)
-        told = [i for i, (name, unit) in enumerate(named) if role_of(name, unit) is not None and i != self.clock]
+        apart = {self.clock, *self.beside}
+        told = [i for i, (name, unit) in enumerate(named) if role_of(name, unit) is not None and i not in apart]
         return tuple(dict.fromkeys([*told, *self.own]))
 
 
@@ -401,14 +403,11 @@ def _values(key: str, text: str, separator: str | None) -> Sequence[tuple[str, s
 # Columns of times in text tables: seconds, time stamps, dates and times of day; and columns that number the rows.
 
 
-NAMED_UNIT = re.compile(r"[_\s](ms|us|ns|min)$", re.IGNORECASE)
 MONTHS = {name: f"{k:02d}" for k, name in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), 1)}
 DAY = 86400.0
 """Seconds."""
 LONGEST_SECONDS = 1.0
 """Largest step of an unnamed column of times that is taken for seconds: more are parts of one."""
-EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
-"""Numbers this large are not seconds since 1970 but parts of them."""
 
 
 class Times:
@@ -451,15 +450,11 @@ class Times:
     def _of_numbers(self, column: np.ndarray) -> np.ndarray:
         clock = self.layout.clock
         assert clock is not None
-        named = NAMED_UNIT.search(self.layout.names[clock])
-        unit = (
-            self.layout.units[clock].lower() if self.layout.units[clock] != "unknown" else (named[1] if named else "s")
-        )
-        factor = FACTORS.get(unit.lower(), 1.0)
+        factor = seconds_of(self.layout.units[clock], self.layout.names[clock]) or 1.0
         largest = float(np.nanmax(np.abs(column), initial=0.0))
         if factor == 1.0:
             factor = next((f for limit, f in EPOCHS if largest > limit), 1.0)
-        if largest * factor > 1e8:
+        if largest * factor > LARGEST:
             # seconds since 1970 leave too few digits for the fraction
             self.origin = float(column[0]) if self.origin is None else self.origin
             return (column - self.origin) * factor
@@ -484,7 +479,7 @@ class Times:
         if found[0].isna().any():
             row = int(np.argmax(found[0].isna().to_numpy()))
             raise SignalFileError(self.path, f"its time in row {row + 1} of the table is {texts.iloc[row]!r}")
-        return (found[0].astype(float) * found[1].map(FACTORS).fillna(1.0)).to_numpy(dtype=float)
+        return (found[0].astype(float) * found[1].map(SECONDS)).to_numpy(dtype=float)
 
     def _of_clocks(self, texts: pd.Series) -> np.ndarray:
         padded = texts.where(texts.str.count(":") == 2, texts + ":00")

@@ -13,8 +13,9 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.signal.labels import HERTZ, RPM_UNITS, THOUSANDS
+from gearmbs.signals.signal.labels import HERTZ, RPM_UNITS, THOUSANDS, name_and_unit
 from gearmbs.signals.signal.signal import SHAFT, STEADY, check_teeth, with_metadata
+from gearmbs.signals.signal.times import in_seconds
 from gearmbs.units import to_si
 from gearmbs.wording import warn
 
@@ -75,9 +76,10 @@ def speed_curve(speed: Any, *, span: tuple[float, float] | None = None) -> Speed
     speed : float, str, sequence, array_like, DataArray, Series, callable or SpeedCurve
         A number in rad/s; text with a unit ("1500 rpm", "25 Hz"); points ``[(t, speed), ...]`` whose entries are
         numbers in s and rad/s or texts with units; a pair of arrays ``(times, speeds)``; a DataArray of dimension time
-        or a pandas Series over seconds, in the unit that ``attrs["units"]`` names (rad/s if it names none); a function
-        of t in s that returns rad/s, for which `span` is needed. A shaft that turns the other way all the time may be
-        given with negative speeds.
+        or a pandas Series over s, or over what the coordinate's ``attrs["units"]`` or the index's name says, as
+        "t [ms]", in the unit that ``attrs["units"]`` names (rad/s if it names none); a function of t in s that returns
+        rad/s, for which `span` is needed. A shaft that turns the other way all the time may be given with negative
+        speeds.
     span : (float, float), optional
         First and last time of interest, s.
 
@@ -144,7 +146,8 @@ def _of_array(speed: xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
     if speed.dims != ("time",) or "time" not in speed.coords:
         raise SignalError(f"speed: a DataArray needs the one dimension time with its times in s, got {speed.dims}")
     unit = speed.attrs.get("units") or "rad/s"
-    return np.asarray(speed["time"].values, dtype=float), unit_factor(str(unit)) * np.asarray(speed.values, dtype=float)
+    times = in_seconds(speed["time"].values, str(speed["time"].attrs.get("units", "")))
+    return times, unit_factor(str(unit)) * np.asarray(speed.values, dtype=float)
 
 
 def _of_series(speed: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -153,12 +156,9 @@ def _of_series(speed: Any) -> tuple[np.ndarray, np.ndarray]:
         if values.ndim == 2 and values.shape[1] == 2:
             return values[:, 0], values[:, 1]
         raise SignalError(f"speed: a table of shape {values.shape} is no speed over time; {FORMS}")
-    times = speed.index
-    if hasattr(times, "total_seconds"):
-        times = times.total_seconds()
-    elif getattr(times, "dtype", np.dtype(float)).kind == "M":
-        times = (times - times[0]).total_seconds()
-    return np.asarray(times, dtype=float), unit_factor(str(speed.attrs.get("units") or "rad/s")) * values.astype(float)
+    name, unit = name_and_unit(str(getattr(speed.index, "name", "")))
+    times = in_seconds(np.asarray(speed.index), unit, name)
+    return times, unit_factor(str(speed.attrs.get("units") or "rad/s")) * values.astype(float)
 
 
 def _of_points(speed: Any) -> tuple[np.ndarray, np.ndarray]:

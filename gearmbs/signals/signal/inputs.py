@@ -110,7 +110,7 @@ def _of_frame(
     from gearmbs.signals.signal.record import signal_from
 
     frame = data if hasattr(data, "columns") else data.to_frame(name="ch1" if data.name is None else data.name)
-    record = record_of_frame(frame, Path("table"), rate)
+    record = record_of_frame(frame, Path("table"), rate, channels, gaps)
     return signal_from(record, Path("table"), rate=rate, units=units, channels=channels, gaps=gaps, **known)
 
 

@@ -18,6 +18,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import MissingMetadataError
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, shaft_coords, units_of, with_metadata
+from gearmbs.signals.signal.times import SECONDS, SUFFIX
 from gearmbs.signals.signal.units import is_usual
 
 BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
@@ -26,8 +27,7 @@ QUOTIENT = re.compile(r"^(.*?\S)\s*/\s*(?:\((.+)\)|(\S.*?))\s*$")
 """DIN 461: a quantity by its unit."""
 IN_WORDS = re.compile(r"^(.*?\S)\s+(?:in|en|v)\s+(?:\((.+)\)|(\S+))\s*$", re.IGNORECASE)
 """``t in ms``, in French and Czech ``en`` and ``v``."""
-SUFFIX = re.compile(r"[_\s](s|sec|ms|us|µs|ns|min)$", re.IGNORECASE)
-PARTS_OF_TIME = frozenset("s sec ms msec us µs ns min h".split())
+WORDS_AND_NUMBERS = re.compile(r"[^\W\d_]+|\d+")
 CLOCK_NAMES = frozenset(
     "time t times timesec timeseconds timestamp timestamps zeit zeitpunkt datetime elapsedtime relativetime "
     "xvalue sampletime tempo temps timems timeus cas".split()
@@ -124,10 +124,21 @@ def is_clock(name: str) -> bool:
     return key_of(SUFFIX.sub("", name))[0] in CLOCK_NAMES
 
 
+def words_of(name: str) -> list[str]:
+    """Return the words and the numbers of a name, without the unit of times at its end."""
+    return WORDS_AND_NUMBERS.findall(folded(SUFFIX.sub("", name)))
+
+
+def may_be_times(name: str, unit: str) -> bool:
+    """Return whether a word of a name is one of times, as in "Time 2" or "t_acc", and its unit of nothing else."""
+    low = unit.strip().lower()
+    return not CLOCK_NAMES.isdisjoint(words_of(name)) and (low in ("", UNKNOWN_UNITS) or low in SECONDS)
+
+
 def tells_time(name: str, unit: str) -> bool:
     """Return whether a column is called as times are and has no unit of something else, as a temperature T has."""
     low = unit.strip().lower()
-    return is_clock(name) and (low in ("", UNKNOWN_UNITS) or low in PARTS_OF_TIME or not is_unit_of_column(unit))
+    return is_clock(name) and (low in ("", UNKNOWN_UNITS) or low in SECONDS or not is_unit_of_column(unit))
 
 
 def unique_names(names: Sequence[str]) -> list[str]:

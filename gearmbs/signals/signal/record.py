@@ -15,8 +15,19 @@ import xarray as xr
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
-from gearmbs.signals.signal.labels import RPM_UNITS, key_of
-from gearmbs.signals.signal.signal import SHAFT, check_teeth, make_signal, rate_of, shaft_coords, uniform_rate, units_of
+from gearmbs.signals.signal.labels import RPM_UNITS, key_of, may_be_times, rises_evenly
+from gearmbs.signals.signal.signal import (
+    ROUNDED_TIMES,
+    SHAFT,
+    check_teeth,
+    make_signal,
+    rate_of,
+    shaft_coords,
+    uniform_rate,
+    units_of,
+)
+from gearmbs.signals.signal.times import SECONDS as OF_TIMES
+from gearmbs.signals.signal.times import seconds_of
 
 # What headers say, by the names that real files use: sampling rates and speeds, and which to believe.
 
@@ -52,7 +63,7 @@ PER_SECOND = {
     "": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "1/s": 1.0, "s/s": 1.0, "ks/s": 1e3, "samples/s": 1.0, "sa/s": 1.0,
     "samples/sec": 1.0, "samples/second": 1.0, "sps": 1.0, "ksps": 1e3, "s^-1": 1.0,
 }  # fmt: skip
-SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+SECONDS = {"": 1.0} | {word: factor for word, factor in OF_TIMES.items() if factor <= 1.0}
 NUMBER = re.compile(r"^\s*([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*[\[(]?\s*([A-Za-zµ/^\-0-9.]*)")
 AGREE = 1e-3
 """Relative difference up to which two rates or speeds in a file are one: headers round to three or four digits."""
@@ -210,6 +221,20 @@ def same_rate(path: Path, rates: Mapping[str, float | None]) -> float | None:
             path, f"its channels have different sampling rates: {listed}; choose with channels=[...] (--channel)"
         )
     return next((rate for rate in rates.values() if rate is not None), None)
+
+
+SAME_START = 0.5
+"""Samples by which channels of one record may begin at other times."""
+
+
+def same_start(path: Path, starts: Mapping[str, float], rate: float | None) -> None:
+    """Refuse channels that begin at different times (s): row by row their samples are not of one instant."""
+    first, last = min(starts.values(), default=0.0), max(starts.values(), default=0.0)
+    if rate is not None and (last - first) * rate > SAME_START:
+        listed = ", ".join(f"{name} at {start - first:g} s" for name, start in starts.items())
+        raise SignalFileError(
+            path, f"its channels begin at different times: {listed}; choose with channels=[...] (--channel)"
+        )
 
 
 # Samples that are missing or not finite: refused, interpolated, or cut out, and said.
@@ -405,6 +430,7 @@ def signal_from(
         raise MissingMetadataError(
             "rate", str(path), f"the file does not hold it, its columns are {record.names[:8]}; pass rate=... in Hz"
         )
+    _times_checked(record, found, path)
     if record.speed is not None and speed is not None:
         record.notes = [note for note in record.notes if not note.startswith("The speed, ")]
     try:
@@ -428,6 +454,22 @@ def signal_from(
         raise
     except SignalError as exc:
         raise SignalFileError(path, str(exc)) from exc
+
+
+def _times_checked(record: Record, rate: float, path: Path) -> None:
+    """Refuse a rate (Hz) that a column of times among the channels contradicts."""
+    for name, unit, values in zip(record.names, record.units, record.values.T, strict=True):
+        if not (may_be_times(name, unit) and rises_evenly(values)):
+            continue
+        told = seconds_of(unit, name)
+        own = (values.size - 1) / float(values[-1] - values[0])
+        # without a unit it may hold ms or us, too
+        possible = [own / told] if told not in (None, 1.0) or unit.lower() in OF_TIMES else [own, 1e3 * own, 1e6 * own]
+        if all(abs(each / rate - 1.0) > ROUNDED_TIMES for each in possible):
+            raise SignalFileError(
+                path, f"the times in its column {name!r} have a rate of {possible[0]:g} Hz, of the record it is "
+                f"{rate:g} Hz; say the true one with rate=... (--rate), or choose channels=[...] (--channel) without it"
+            )  # fmt: skip
 
 
 def _units_said(units: str | Sequence[str] | Mapping[str, str] | None, record: Record) -> Any:
@@ -471,6 +513,49 @@ def record_from_json(values: np.ndarray, text: str, path: Path) -> Record:
     if len(names) != values.shape[1] or len(units) != len(names):
         raise SignalFileError(path, f"its metadata names {len(names)} channels, its samples have {values.shape[1]}")
     return record
+
+
+def mean_rate(times: np.ndarray) -> float:
+    """Sampling rate in Hz of times in s, the mean one where they are not even; nan of times that do not rise."""
+    try:
+        return uniform_rate(times)
+    except SignalError:
+        span = float(times[-1] - times[0]) if times.size > 1 else 0.0
+        return (times.size - 1) / span if span > 0.0 and bool(np.all(np.diff(times) >= 0.0)) else math.nan
+
+
+def rate_by_times(times: np.ndarray, path: Path, given: float | None, others: bool = False) -> float | None:
+    """Sampling rate in Hz of the times in a file; where they are only rounded the given one.
+
+    Parameters
+    ----------
+    times : ndarray of shape (n,)
+        s.
+    path : Path
+    given : float, optional
+        Hz, by the caller.
+    others : bool
+        Whether the file tells a rate elsewhere: then times that are not even tell none.
+
+    Raises
+    ------
+    SignalFileError
+        If they are not even and nothing else tells the rate, or contradict the given one.
+    """
+    try:
+        return rate_from_times(times, path)
+    except SignalFileError:
+        mean = mean_rate(np.asarray(times, dtype=float))
+        if given is not None and math.isfinite(mean):
+            if abs(mean - given) <= ROUNDED_TIMES * given:
+                return given
+            raise SignalFileError(
+                path, f"time: is not uniform, its mean rate is {mean:g} Hz, the call says rate={given:g}; "
+                "leave rate out and resample the record, or leave the times out of the file"
+            ) from None  # fmt: skip
+        if others and math.isfinite(mean):
+            return None
+        raise
 
 
 def rate_from_times(times: np.ndarray, path: Path) -> float:

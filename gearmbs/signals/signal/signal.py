@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from gearmbs._lazy import spare_duck_arrays
 from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.signals.signal.times import in_seconds, seconds_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +29,8 @@ UNKNOWN_UNITS = "unknown"
 MIXED_UNITS = "mixed"
 SHAFT = {"speed": "rad/s", "angle": "rad"}
 """Coordinates over time that tell how the shaft turns, with their units."""
+ROUNDED_TIMES = 0.01
+"""Relative difference up to which the mean rate of rounded times is the rate that is given."""
 STEADY = 1e-3
 """A speed over time that strays less than this part from its mean is a constant one."""
 CLOCK_TOLERANCE = 0.05
@@ -161,7 +164,8 @@ def as_signal(signal: xr.DataArray | xr.Dataset, rate: float | None = None) -> x
     """Bring a DataArray or a Dataset with a time dimension to the agreed form.
 
     A Dataset contributes each of its 1-D (time) variables as a channel, with the variable's `units`. The rate comes
-    from `rate`, the attribute `sampling_rate`, or a uniform `time` coordinate in s.
+    from `rate`, the attribute `sampling_rate`, or a uniform `time` coordinate: of dates, or of numbers in s
+    or in the unit of time that its attribute `units` names.
 
     Raises
     ------
@@ -206,10 +210,22 @@ def as_signal(signal: xr.DataArray | xr.Dataset, rate: float | None = None) -> x
     t0 = 0.0
     found = rate if rate is not None else array.attrs.get("sampling_rate")
     if "time" in array.coords:
-        times = np.asarray(array["time"].values, dtype=float)
+        unit = str(array["time"].attrs.get("units", ""))
+        if seconds_of(unit) is None:
+            raise SignalError(
+                f"time: its unit {unit!r} is none of time; set attrs['units'] of the coordinate, as to 's'"
+            )
+        times = in_seconds(array["time"].values, unit)
         t0 = float(times[0]) if times.size else 0.0
+        span = float(times[-1] - times[0]) if times.size > 1 else 0.0
         if found is None and times.size > 1:
             found = uniform_rate(times)
+        elif span > 0.0 and abs((times.size - 1) / span / check_rate(found) - 1.0) > ROUNDED_TIMES:
+            said = "the attribute sampling_rate" if rate is None else "the call"
+            raise SignalError(
+                f"rate: the times have a rate of {(times.size - 1) / span:g} Hz, {said} says {check_rate(found):g} Hz; "
+                "leave that out, or drop the coordinate time"
+            )
     attrs = {k: v for k, v in array.attrs.items() if k not in ("sampling_rate", "speed", "teeth", "units")}
     result = make_signal(
         data,
