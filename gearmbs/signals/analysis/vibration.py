@@ -37,7 +37,7 @@ from gearmbs.signals.rotation.rate import MIXED, other_rate
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, refined_speed, remark_plausibility
 from gearmbs.signals.rotation.sweep import remark_sweep
 from gearmbs.signals.signal.signal import rate_of, units_of
-from gearmbs.signals.signal.units import unit_dimension
+from gearmbs.signals.signal.units import detected_unit, unit_dimension
 from gearmbs.signals.spectra import envelope, spectrum
 
 # What was found in a record of which no teeth are known, as data, tables and Markdown.
@@ -347,7 +347,9 @@ def _velocity(signal: xr.DataArray) -> np.ndarray | str:
     try:
         kinds = [unit_dimension(unit)[0] for unit in units_of(signal)]
     except SignalError:
-        return "the units are not known; give units='m/s^2' or 'g'"
+        levels = [unit for unit in units_of(signal) if detected_unit(unit) is not None]
+        known = f"{levels[0]!r} is the unit of a level" if levels else "the units are not known"
+        return f"{known}; give units='m/s^2' or 'g'"
     if any(kind not in ("acceleration", "velocity") for kind in kinds):
         return "a channel is neither an acceleration nor a velocity"
     low, high = VELOCITY_BAND

@@ -28,6 +28,7 @@ from gearmbs.signals.signal.signal import (
 )
 from gearmbs.signals.signal.times import SECONDS as OF_TIMES
 from gearmbs.signals.signal.times import seconds_of
+from gearmbs.signals.signal.units import detected_unit
 
 # What headers say, by the names that real files use: sampling rates and speeds, and which to believe.
 
@@ -435,7 +436,7 @@ def signal_from(
         record.notes = [note for note in record.notes if not note.startswith("The speed, ")]
     try:
         values, first, said = without_gaps(record.values, gaps, found)
-        notes = [*record.notes, *said]
+        notes = [*record.notes, *said, *_levels_told(record, units)]
         signal = make_signal(
             values,
             found,
@@ -470,6 +471,20 @@ def _times_checked(record: Record, rate: float, path: Path) -> None:
                 path, f"the times in its column {name!r} have a rate of {possible[0]:g} Hz, of the record it is "
                 f"{rate:g} Hz; say the true one with rate=... (--rate), or choose channels=[...] (--channel) without it"
             )  # fmt: skip
+
+
+def _levels_told(record: Record, units: Any) -> list[str]:
+    """Say which units are those of levels, where the caller gives no others."""
+    said = _units_said(units, record)
+    texts = (
+        said if isinstance(said, list) else [said.get(n, "") for n in record.names] if isinstance(said, dict) else []
+    )
+    found = {name: text for name, text in zip(record.names, texts) if detected_unit(text) is not None}
+    return [
+        f"CHECK THE UNIT: {name!r} is in {text!r}, that of a level; if it holds the samples of a waveform, say "
+        f"units={{{name!r}: {detected_unit(text)!r}}} (--units '{name}={detected_unit(text)}')."
+        for name, text in found.items()
+    ]
 
 
 def _units_said(units: str | Sequence[str] | Mapping[str, str] | None, record: Record) -> Any:

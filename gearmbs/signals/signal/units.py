@@ -20,8 +20,25 @@ DIMENSIONS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "
 # In vibration work g is the standard acceleration of gravity; unit libraries read g and mg as masses.
 ALIASES = {
     "g": "standard_gravity", "gn": "standard_gravity", "G": "standard_gravity", "mg": "millistandard_gravity",
+    "ug": "microstandard_gravity", "g's": "standard_gravity", "G's": "standard_gravity",
 }  # fmt: skip
-REPLACEMENTS = (("²", "^2"), ("µ", "u"), ("μ", "u"), ("m/s2", "m/s^2"), ("ms^-2", "m/s^2"), ("·", "*"))
+REPLACEMENTS = (
+    ("²", "^2"), ("µ", "u"), ("μ", "u"), ("m/s2", "m/s^2"), ("in/s2", "in/s^2"), ("ms^-2", "m/s^2"), ("·", "*"),
+    ("m s-2", "m/s^2"), ("m s^-2", "m/s^2"), ("m s-1", "m/s"), ("m s^-1", "m/s"),
+)  # fmt: skip
+AMERICAN = (
+    (re.compile(r"(?<![A-Za-z])mils?(?![A-Za-z])"), "thou"),
+    (re.compile(r"(?<![A-Za-z])ips(?![A-Za-z])"), "inch/s"),
+)
+"""Of proximity probes and velocity pickups; to unit libraries a mil is an angle."""
+IN_CAPITALS = frozenset(("m/s", "mm/s", "m/s^2", "mm/s^2", "in/s", "in/s^2", "ips", "mil", "mils", "um", "mm", "mg"))
+"""Units that instruments without small letters write, of which S alone would be siemens and M a molar."""
+DETECTED = re.compile(
+    r"^(?P<unit>.+?)(?:[\s_(]*(?:true\s*)?(?:pk|peak|pp|rms|p-p|pk-pk|pkpk|peak[\s-]*(?:to[\s-]*)?peak)"
+    r"|[\s_(]+(?:eff|ss|s-s|0-pk?|o-pk?|0p|op|p))\)?$",
+    re.IGNORECASE,
+)
+"""A unit with how a level was had of the samples: RMS, peak, peak-to-peak (in German eff, SS)."""
 
 
 def unit_dimension(unit: str) -> tuple[str, float]:
@@ -30,9 +47,15 @@ def unit_dimension(unit: str) -> tuple[str, float]:
     Raises
     ------
     SignalError
-        If the unit is unknown or of another dimension.
+        If the unit is unknown, of another dimension, or that of a level, as "mm/s RMS".
     """
     from pint.errors import PintError
+
+    if (bare := detected_unit(unit)) is not None:
+        raise SignalError(
+            f"units: {unit!r} is that of a level, not of samples; if these are the samples of a waveform, set "
+            f"with_metadata(signal, units={bare!r})"
+        )
 
     try:
         return _dimension(unit)
@@ -45,14 +68,46 @@ def unit_dimension(unit: str) -> tuple[str, float]:
 
 @lru_cache(maxsize=128)
 def _dimension(unit: str) -> tuple[str, float]:
-    text = unit.strip()
-    for old, new in REPLACEMENTS:
-        text = text.replace(old, new)
-    quantity = unit_registry().Quantity(1.0, ALIASES.get(text, text))
+    quantity = unit_registry().Quantity(1.0, _as_written(unit))
     for dimension, si in DIMENSIONS.items():
         if quantity.is_compatible_with(si):
             return dimension, float(quantity.to(si).magnitude)
     raise ValueError(unit)
+
+
+def detected_unit(unit: str) -> str | None:
+    """Return the unit of the samples of which one of a level tells RMS, peak or peak-to-peak; None of any other.
+
+    Examples
+    --------
+    >>> detected_unit("mil pp"), detected_unit("mm/s RMS"), detected_unit("grms"), detected_unit("rpm")
+    ('mil', 'mm/s', 'g', None)
+    """
+    found = DETECTED.match(unit.strip())
+    bare = "" if found is None else found["unit"].strip()
+    return bare if is_usual(bare) or bare in DISPLACEMENTS else None
+
+
+def _spelled(unit: str) -> str:
+    """Return a unit without signs of print, in small letters where only capitals are at hand."""
+    text = _without_signs(unit.strip())
+    low = _without_signs(text.lower())
+    named = text.isupper() or low in ("mil", "mils") or _without_signs(text.replace("S", "s")) == low
+    return low if low in IN_CAPITALS and named else text
+
+
+def _without_signs(text: str) -> str:
+    for old, new in REPLACEMENTS:
+        text = text.replace(old, new)
+    return text
+
+
+def _as_written(unit: str) -> str:
+    """Return a unit as the library of units has it."""
+    text = _spelled(unit)
+    for pattern, new in AMERICAN:
+        text = pattern.sub(new, text)
+    return ALIASES.get(text, text)
 
 
 @lru_cache(maxsize=1)
@@ -68,7 +123,10 @@ def unit_registry() -> Any:
 USUAL = (
     "m", "mm", "um", "m/s", "mm/s", "in/s", "m/s^2", "mm/s^2", "g", "mg", "N", "kN", "N*m", "V", "mV", "A", "mA", "Pa",
     "kPa", "bar", "rpm", "Hz", "rad/s", "deg/s", "rad", "deg", "degC", "K", "s", "ms", "W", "kW", "%", "1", "dB", "ips",
+    "mil", "mils",
 )  # fmt: skip
+DISPLACEMENTS = frozenset(("thou", "in", "cm", "ft", "in/s^2", "ft/s", "ft/s^2", "cm/s", "cm/s^2", "nm", "um/s"))
+"""Further units of vibration, of which levels are told."""
 VIBRATION = ("'m/s^2'", "'g'", "'mg'", "'mm/s'", "'um'", "'N'")
 ELECTRICAL = frozenset({"V", "mV", "uV", "µV", "A", "mA", "C", "pC", "nC"})
 COUNTS = frozenset(
@@ -94,6 +152,11 @@ def check_units(units: Any) -> None:
             raise SignalError(
                 f"units: {text!r} is a sensitivity or a scale, not a unit of samples; give units={ratio[0]!r} as they "
                 f"are, or scale them and give units={ratio[1]!r}"
+            )
+        if (bare := detected_unit(text)) is not None:
+            raise SignalError(
+                f"units: {text!r} is that of a level, not of samples; give units={bare!r} if these are the samples of "
+                "a waveform; of levels no spectrum can be had"
             )
         if not _is_unit(text):
             example = "write for example 'm/s^2' or 'g'"
@@ -122,8 +185,7 @@ def _sensitivity(text: str) -> tuple[str, str] | None:
 
 def is_usual(text: str) -> bool:
     """True for the units of measured signals themselves, in any of their spellings; not for all that could be one."""
-    for old, new in REPLACEMENTS:
-        text = text.replace(old, new)
+    text = _spelled(text)
     return text in USUAL or text in ALIASES
 
 
@@ -131,11 +193,11 @@ def _is_unit(text: str) -> bool:
     clean = text.strip()
     if clean in USUAL or clean in ALIASES or clean in DIMENSIONS.values() or clean.lower() in COUNTS:
         return True
-    for old, new in (*REPLACEMENTS, ("°", "deg"), ("%", "percent")):
+    clean = _as_written(clean)
+    for old, new in (("°", "deg"), ("%", "percent"), ("Nm", "N*m")):
         clean = clean.replace(old, new)
-
     try:
-        unit_registry().Unit(clean.replace("Nm", "N*m").replace("ips", "inch/s"))
+        unit_registry().Unit(clean)
     except Exception:
         return False
     return True
