@@ -27,7 +27,7 @@ from gearmbs.signals.analysis.report import (
 from gearmbs.signals.analysis.vibration import VibrationReport, vibration_report
 from gearmbs.signals.diagnosis.planetary import PlanetaryReport, diagnose_planetary
 from gearmbs.signals.diagnosis.planetary_averages import planetary_lines
-from gearmbs.signals.errors import SignalError
+from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.optical import instrument_faults
 from gearmbs.signals.rotation.angular import angular_resample, samples_per_revolution, time_synchronous_average
@@ -36,7 +36,7 @@ from gearmbs.signals.rotation.shaft import Known, Shaft, compare_with_mesh, know
 from gearmbs.signals.signal.arguments import DataKeywords
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
-from gearmbs.signals.signal.labels import measured
+from gearmbs.signals.signal.labels import UNIT_ASKED, measured
 from gearmbs.signals.signal.signal import check_teeth, common_unit, make_signal, rate_of, units_of, with_metadata
 from gearmbs.signals.spectra import spectrum
 
@@ -236,7 +236,15 @@ def analyse(
         return _planetary(data, options)
     if counts is None:
         return vibration_report(data, options.known, lines=options.lines, progress=progress)
-    return _report(data, check_teeth(counts), options, _Stages(progress))
+    try:
+        return _report(data, check_teeth(counts), options, _Stages(progress))
+    except MissingMetadataError:
+        raise
+    except SignalError as error:
+        asked = [note for note in data.attrs.get("notes", ()) if note.startswith(UNIT_ASKED)]
+        if not asked:
+            raise
+        raise SignalError(f"{error}; {asked[0]}") from error
 
 
 def analyse_file(path: str | Path, **settings: Unpack[FileKeywords]) -> AnalysisReport | VibrationReport:

@@ -17,7 +17,7 @@ from gearmbs.signals.signal.labels import may_be_times, role_of, words_of
 from gearmbs.signals.signal.record import REMEDY, checked_gaps, mean_rate, same_rate, same_start
 from gearmbs.signals.signal.times import in_seconds
 
-STRETCHED = ("speed", "temperature", "share")
+STRETCHED = ("speed", "temperature", "share", "frequency")
 """What is interpolated to the times of the others."""
 FEWEST = 2
 """Times that a column has at least."""

@@ -28,6 +28,7 @@ from gearmbs.signals.rotation.speed import (
 )
 from gearmbs.signals.rotation.sweep import remark_sweep, remark_wander
 from gearmbs.signals.signal.given import is_curve, speed_curve, unit_factor
+from gearmbs.signals.signal.labels import unit_of_rotation
 from gearmbs.signals.signal.signal import rate_of
 from gearmbs.signals.spectra import periodograms
 
@@ -121,7 +122,7 @@ def speed_of_channel(signal: xr.DataArray, channel: str) -> xr.DataArray:
     if unit == "unknown" and "rpm" in channel.lower():
         unit = "rpm"
     try:
-        factor = unit_factor(unit)
+        factor = unit_factor(unit_of_rotation(channel, unit) or unit)
     except SignalError:
         raise SignalError(
             f"speed_channel: {channel!r} is in {unit!r}; say its unit, rpm, Hz or rad/s, with "

@@ -16,6 +16,7 @@ from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.labels import HERTZ, RPM_UNITS, THOUSANDS, name_and_unit
 from gearmbs.signals.signal.signal import SHAFT, STEADY, check_teeth, with_metadata
 from gearmbs.signals.signal.times import in_seconds
+from gearmbs.signals.signal.units import scaled
 from gearmbs.units import to_si
 from gearmbs.wording import warn
 
@@ -176,8 +177,11 @@ def _of_points(speed: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def unit_factor(unit: str) -> float:
-    """Factor from a unit of rotation to rad/s: rpm, Hz, rad/s, deg/s, 1/min ..."""
+    """Factor from a unit of rotation to rad/s: rpm, Hz, rad/s, deg/s, 1/min, 0.1 rpm ..."""
     clean = unit.strip()
+    parts = None if clean.lower() in THOUSANDS else scaled(clean)
+    if parts is not None:
+        return parts[0] * unit_factor(parts[1])
     if clean.lower() in THOUSANDS:
         return 1000.0 * _quantity("1 rpm", "angular speed", "speed")
     text = "rpm" if clean.lower() in RPM_UNITS else "Hz" if clean.lower() in HERTZ else clean

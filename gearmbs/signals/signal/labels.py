@@ -16,10 +16,10 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from gearmbs.signals.errors import MissingMetadataError
+from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, shaft_coords, units_of, with_metadata
 from gearmbs.signals.signal.times import SECONDS, SUFFIX
-from gearmbs.signals.signal.units import is_usual
+from gearmbs.signals.signal.units import detected_unit, is_usual, scaled, unit_dimension
 
 BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
@@ -41,9 +41,14 @@ THOUSANDS = frozenset(("krpm", "rpm x1000", "rpm x 1000", "rpm*1000", "x1000 rpm
 TURNS = frozenset("rps u/s rev/s r/s tr/s ot/s".split())
 HERTZ = frozenset("hz 1/s s-1 s^-1".split()) | TURNS
 OF_ROTATION = HERTZ | THOUSANDS | {"rad/s", "deg/s", "°/s"}
-SPEED_COLUMN = re.compile(
-    r"speed|rpm|drehzahl|umdrehung|otack|otacek|vitesse(?!vib)|regimemoteur|^n$|^n\d$|^omega$|shaftfreq|rotationfreq"
+ANGULAR_COLUMN = re.compile(
+    r"^omega\d*$|winkelgeschw|kreisgeschw|angularvel|angularspeed|angvel|vitesseangul|uhlov\w*rychlost|velocidadangular"
 )
+SPEED_COLUMN = re.compile(
+    r"speed|rpm|drehzahl|drehfreq|drehgeschw|umdrehung|otack|otacek|otacen|vitesse(?!vib)|regimemoteur|^n$|^n\d$|"
+    r"shaftfreq|rotation(al)?freq|rotfreq|^f_?rot$|frequencederotation|wellenfreq|" + ANGULAR_COLUMN.pattern
+)
+TRAVEL = frozenset(("km/h", "kmh", "kph", "mph"))
 SHAFT_COLUMN = re.compile(r"shaft|welle|hridel|arbre|spindle|spindel|rotor|motor")
 ANGLE_UNITS = frozenset(("deg", "°", "rad", "grad"))
 FORWARD = 0.9
@@ -59,12 +64,17 @@ EVEN = 1e-3
 FEWEST_EVEN = 16
 STEADY = 0.2
 """Standard deviation by mean up to which a column named n, without a unit, is a speed."""
+SLOW = 0.05
+"""Standard deviation of its steps by its own up to which such a column is a run-up: of a vibration in its band they
+are as large."""
 
 SHARES = frozenset(("%", "percent"))
-Role = Literal["time", "speed", "tacho", "temperature", "count", "angle", "share"]
+Role = Literal["time", "speed", "tacho", "temperature", "count", "angle", "share", "frequency"]
 SLOW_ROLES = ("speed", "temperature")
 """Columns of these may have fewer samples than the others, and are interpolated."""
 SLOW_SAID = "{name} has fewer samples than the {size} of the others; between them it is interpolated."
+UNIT_ASKED = "The unit of the speed in "
+"""Begin of what is said of a speed that cannot be used as its unit is not known."""
 WORDS: dict[str, str] = {
     "time": "holds times",
     "speed": "holds the speed",
@@ -73,13 +83,14 @@ WORDS: dict[str, str] = {
     "count": "counts or tells time: it rises evenly",
     "angle": "holds the angle of a shaft",
     "share": "holds percents, as of a load,",
+    "frequency": "holds a frequency",
 }
 
 
 def folded(text: str) -> str:
     """Return a text in lower case without accents: "Otáčky" as "otacky"."""
     plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
-    return "".join(c for c in plain if not unicodedata.combining(c)).lower()
+    return "".join(c for c in plain if not unicodedata.combining(c)).lower().replace("ω", "omega")
 
 
 def key_of(name: str) -> tuple[str, str]:
@@ -102,7 +113,7 @@ def name_and_unit(label: str) -> tuple[str, str]:
     """
     if label.strip().lower() in TURNS:
         return label.strip(), label.strip()
-    for pattern in (QUOTIENT, IN_WORDS):
+    for pattern in (IN_WORDS, QUOTIENT):
         found = pattern.match(label)
         unit = (found.group(2) or found.group(3) or "").strip() if found else ""
         if found and is_unit_of_column(unit):
@@ -166,31 +177,87 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
     name, unit : str
     values : ndarray, optional
         Where they are known, columns that rise evenly are counts or times, angles that go on are a shaft's, and one
-        that is called n and has no unit is a speed only if it is positive and nearly constant.
+        that is called n and has no unit is a speed only if it keeps its sign and is nearly constant or changes slowly.
     """
     key, low = key_of(name)[0], unit.strip().lower()
-    unknown = low in ("", UNKNOWN_UNITS)
+    unknown = low in ("", UNKNOWN_UNITS, "-")
     timed = low in ("s", "ms", "us", "µs", "sec")
-    if low in RPM_UNITS or low in THOUSANDS or low in TURNS or (SPEED_COLUMN.search(key) and low in OF_ROTATION):
+    named, electric = SPEED_COLUMN.search(key) is not None, low in ("v", "mv", "a", "ma")
+    if (
+        _turns(low)
+        or (named and unit_of_rotation(name, unit) is not None)
+        or (SHAFT_COLUMN.search(key) and low in HERTZ)
+    ):
         return "speed"
     if low in SHARES:
         return "share"
-    if SHAFT_COLUMN.search(key) and low in HERTZ:
-        return "speed"
+    if low in ("hz", "khz"):
+        return "speed" if named else "frequency"
     if low in ANGLE_UNITS and values is not None and np.mean(np.diff(values) > 0.0) >= FORWARD:
         return "angle"
     if is_clock(name) and (unknown or timed):
         return "time"
     if low in TEMPERATURE_UNITS or (TEMPERATURE_COLUMN.search(key) and (unknown or low in ("k", "c", "f"))):
         return "temperature"
-    if TACHO_COLUMN.search(key) and (unknown or low in ("v", "mv", "1", "-")):
+    if TACHO_COLUMN.search(key) and (unknown or low in ("v", "mv", "1")):
         return "tacho"
+    if named and unknown:
+        return _speed_or_count(key, values)
     if values is not None and rises_evenly(values) and (unknown or timed or COUNT_COLUMN.match(key)):
         return "count"
-    if SPEED_COLUMN.search(key) and unknown:
-        steady = values is None or (values.min() >= 0.0 and float(values.std()) <= STEADY * float(values.mean()))
-        return "speed" if steady or len(key) > 2 else None
-    return None
+    # of no vibration either, as a voltage for the speed, or a unit that nobody knows
+    return "speed" if named and ((electric and len(key) > 1) or low in TRAVEL or not _of_vibration(unit)) else None
+
+
+def _turns(low: str) -> bool:
+    """Return whether a unit is one of turns, whatever has it."""
+    parts = scaled(low)
+    low = low if parts is None else parts[1]
+    return low in RPM_UNITS or low in THOUSANDS or low in TURNS
+
+
+def _of_vibration(unit: str) -> bool:
+    try:
+        return is_unit_of_column(unit) or bool(unit_dimension(unit))
+    except SignalError:
+        return detected_unit(unit) is not None
+
+
+def _speed_or_count(key: str, values: np.ndarray | None) -> Role | None:
+    """Return what a column named as speeds are is, without a unit; one called n may be anything that is no speed."""
+    if values is None or len(key) > 2:
+        return "speed"
+    if rises_evenly(values):
+        return "count" if np.all(np.diff(values) == 1.0) else "speed"
+    mean, spread = float(values.mean()), float(values.std())
+    steps = float(np.diff(values).std()) if values.size > 1 else spread
+    one_way = values.min() >= 0.0 or values.max() <= 0.0
+    return "speed" if one_way and (spread <= STEADY * abs(mean) or steps <= SLOW * spread) else None
+
+
+def unit_of_rotation(name: str, unit: str) -> str | None:
+    """Return the unit in which a column holds a speed, or None if it is none of rotation.
+
+    A reciprocal second is a turn a second of a speed n, and a radian a second of an angular velocity; of the latter in
+    Hz nobody knows.
+
+    Examples
+    --------
+    >>> unit_of_rotation("Drehzahl", "1/s"), unit_of_rotation("omega", "1/s"), unit_of_rotation("n", "0.1 rpm")
+    ('1/s', 'rad/s', '0.1 rpm')
+    >>> unit_of_rotation("omega", "Hz"), unit_of_rotation("speed", "V")
+    (None, None)
+    """
+    low, angular = unit.strip().lower(), ANGULAR_COLUMN.search(key_of(name)[0]) is not None
+    if angular and low in HERTZ - TURNS:
+        return None if low == "hz" else "rad/s"
+    parts = scaled(low)
+    base = low if parts is None else parts[1]
+    return unit if base in RPM_UNITS or base in OF_ROTATION else None
+
+
+def _in_rpm(name: str, unit: str) -> bool:
+    return unit == UNKNOWN_UNITS and "rpm" in name.lower()
 
 
 def measured(
@@ -230,7 +297,7 @@ def measured(
     known = speed_known or signal.attrs.get("speed") is not None or bool(shaft_coords(signal))
     speeds = [name for name, role in told.items() if role == "speed"]
     units = dict(zip(names, units_of(signal), strict=True))
-    usable = [name for name in speeds if units[name] != UNKNOWN_UNITS or "rpm" in name.lower()]
+    usable = [name for name in speeds if unit_of_rotation(name, units[name]) is not None or _in_rpm(name, units[name])]
     used_speed, notes = None, []
     if not known and len(usable) > 1:
         say = f"say which: speed_channel={usable[0]!r} (--speed-channel {usable[0]!r})"
@@ -238,14 +305,26 @@ def measured(
     if not known and usable:
         used_speed = usable[0]
         notes.append(f"The speed is that of the column {used_speed!r}; speed=... (--speed) says another.")
+        unit = unit_of_rotation(used_speed, units[used_speed])
+        if unit == "rad/s" != units[used_speed]:
+            notes.append(
+                f"{used_speed!r} is an angular velocity, its {units[used_speed]} is rad/s; if it holds turns a second, "
+                f"say units={{{used_speed!r}: 'rps'}} (--units '{used_speed}=rps')."
+            )
     elif not known and speeds:
         column = speeds[0]
+        unit = units[column]
+        what = "is missing" if unit.lower() in ("", UNKNOWN_UNITS, "-") else f"is {unit!r}, none of rotation"
         notes.append(
-            f"The unit of the speed in {column!r} is missing; say it to use it: units={{{column!r}: 'rpm'}} "
-            f"(--units '{column}=rpm')."
+            f"{UNIT_ASKED}{column!r} {what}; say it to use it: units={{{column!r}: 'rpm'}} (--units '{column}=rpm')."
         )
     elif not known:
         pulses = [name for name, role in told.items() if role == "tacho"][:1]
+        notes += [
+            f"If {name!r} is the frequency of the shaft, say so: speed_channel={name!r} (--speed-channel '{name}')."
+            for name, role in told.items()
+            if role == "frequency"
+        ]
         notes += [f"{p!r} gives the speed: tacho={p!r} and pulses_per_rev (--tacho, --pulses)." for p in pulses]
     notes += [
         f"{name!r} {WORDS[role]} and is not analysed as vibration." for name, role in told.items() if name != used_speed

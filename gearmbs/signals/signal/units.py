@@ -68,11 +68,39 @@ def unit_dimension(unit: str) -> tuple[str, float]:
 
 @lru_cache(maxsize=128)
 def _dimension(unit: str) -> tuple[str, float]:
+    parts = scaled(unit)
+    if parts is not None:
+        dimension, factor = _dimension(parts[1])
+        return dimension, parts[0] * factor
     quantity = unit_registry().Quantity(1.0, _as_written(unit))
     for dimension, si in DIMENSIONS.items():
         if quantity.is_compatible_with(si):
             return dimension, float(quantity.to(si).magnitude)
     raise ValueError(unit)
+
+
+NUMBER = r"10(?:\^|\*\*)\(?[-+]?\d+\)?|\d+(?:[.,]\d+)?(?:e[-+]?\d+)?"
+SCALED = (
+    re.compile(rf"^[x×*·]?\s*(?P<factor>{NUMBER})\s*[x×*·]?\s*(?P<unit>(?:[^\W\d]|1/).*)$", re.IGNORECASE),
+    re.compile(rf"^(?P<unit>[^\W\d].*?)\s*[x×*]\s*(?P<factor>{NUMBER})$", re.IGNORECASE),
+)
+
+
+def scaled(unit: str) -> tuple[float, str] | None:
+    """Return factor and unit of one that is a multiple, or None; 50 g may be a range.
+
+    Examples
+    --------
+    >>> scaled("0.1 rpm"), scaled("10^-3 g"), scaled("rpm x 100"), scaled("1/min"), scaled("50 g")
+    ((0.1, 'rpm'), (0.001, 'g'), (100.0, 'rpm'), None, None)
+    """
+    found = next((match for pattern in SCALED if (match := pattern.match(unit.strip()))), None)
+    if found is None:
+        return None
+    power = re.match(r"10(?:\^|\*\*)\(?([-+]?\d+)", found["factor"])
+    factor = 10.0 ** int(power[1]) if power else float(found["factor"].replace(",", "."))
+    signed = power is not None or re.search(r"[x×*·]", unit.replace(found["unit"], "")) is not None
+    return (factor, found["unit"].strip()) if factor <= 1.0 or signed else None
 
 
 def detected_unit(unit: str) -> str | None:

@@ -1,0 +1,103 @@
+"""Columns of speeds as laboratories call them: used with the right factor or asked for, never vibration or time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gearmbs.signals import SignalError, analyse, read_signal
+from gearmbs.signals.rotation.shaft import speed_of_channel
+from gearmbs.signals.signal.labels import measured, name_and_unit, role_of
+from gearmbs.signals.signal.units import unit_dimension
+from tests.says import says
+
+RATE, COUNT = 10000.0, 20000
+TIME = np.arange(COUNT) / RATE
+RPM = 600.0 + 600.0 * TIME
+TURNS = np.cumsum(RPM / 60.0) / RATE
+NOISE = np.random.default_rng(0).standard_normal(COUNT)
+ACC = np.cos(2 * np.pi * 5 * TURNS) + 0.5 * np.cos(2 * np.pi * 10 * TURNS) + 0.05 * NOISE
+RAD = np.pi / 30.0
+
+
+def written(path, label, values):
+    pd.DataFrame({"t [s]": TIME, "a [g]": ACC, label: values}).to_csv(path, index=False, float_format="%.5f")
+    return path
+
+
+@pytest.mark.parametrize(("label", "factor"), [
+    ("omega [1/s]", RAD), ("Omega [rad/s]", RAD), ("\u03c9 [rad/s]", RAD), ("\u03a9 in 1/s", RAD),
+    ("Winkelgeschwindigkeit [1/s]", RAD), ("Winkelgeschwindigkeit / (rad/s)", RAD), ("angular velocity [s^-1]", RAD),
+    ("angular speed [deg/s]", 6.0), ("vitesse angulaire [rad/s]", RAD),
+    ("Drehzahl [1/s]", 1.0 / 60.0), ("n [1/s]", 1.0 / 60.0), ("Drehfrequenz [Hz]", 1.0 / 60.0),
+    ("f_rot [Hz]", 1.0 / 60.0), ("Wellenfrequenz [Hz]", 1.0 / 60.0), ("rotational frequency [Hz]", 1.0 / 60.0),
+    ("n [0.1 rpm]", 10.0), ("n [0,1 1/min]", 10.0), ("speed [rpm x 10]", 0.1), ("Drehzahl [x 0.5 U/min]", 2.0),
+    ("n [10^-1 rpm]", 10.0), ("n [rpm]", 1.0),
+])  # fmt: skip
+def test_speeds_are_used_in_the_unit_that_name_and_unit_mean(label, factor, tmp_path):
+    signal = read_signal(written(tmp_path / "s.csv", label, factor * RPM))
+    left, column = measured(signal)
+    assert column is not None
+    np.testing.assert_allclose(speed_of_channel(left, column), RAD * RPM, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("label", "values", "words"), [
+    ("n", RPM, ("n", "missing", "--units 'n=rpm'")),
+    ("speed", RPM / 60.0, ("speed", "missing", "units={'speed': 'rpm'}")),
+    ("n", 1200.0 - 300.0 * (TIME - 2.0) ** 2, ("n", "missing")), ("n", -RPM, ("n", "missing")),
+    ("Drehzahl [V]", RPM / 300.0, ("Drehzahl", "'V'")), ("speed [digits]", RPM, ("speed", "'digits'")),
+    ("speed [km/h]", RPM / 100.0, ("speed", "'km/h'")), ("omega [Hz]", RPM / 60.0, ("omega", "'Hz'")),
+    ("n [100 rpm]", RPM / 100.0, ("n", "'100 rpm'")),
+])  # fmt: skip
+def test_speeds_whose_unit_is_open_are_asked_for(label, values, words, tmp_path):
+    """In the report, and beside what fails without it."""
+    path = written(tmp_path / "s.csv", label, values)
+    signal = read_signal(path)
+    left, column = measured(signal)
+    assert (left["channel"].values.tolist(), column) == (["a"], None)
+    assert any(pd.Series(left.attrs["notes"]).str.contains(says("unit of the speed", *words)))
+    assert not any("tells time" in note for note in left.attrs["notes"])
+
+
+def test_what_fails_without_the_speed_names_the_column_that_may_hold_it(tmp_path):
+    path = written(tmp_path / "s.csv", "n", RPM)
+    with pytest.raises(SignalError, match=says("signal", "--units 'n=rpm'")):
+        analyse(path, 5)
+    report = analyse(path, 5, units={"n": "rpm"})
+    assert report.speed * 30.0 / np.pi == pytest.approx(RPM.mean(), rel=1e-3)
+
+
+def test_an_angular_velocity_in_reciprocal_seconds_is_remarked_on(tmp_path):
+    path = written(tmp_path / "s.csv", "omega [1/s]", RAD * RPM)
+    report = analyse(path)
+    assert report.speed == pytest.approx(RAD * RPM.mean(), rel=1e-3)
+    assert any("rad/s" in note and "rps" in note for note in report.notes)
+    told = analyse(path, units={"omega": "rps"})
+    assert told.speed == pytest.approx(2 * np.pi * RAD * RPM.mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize(("name", "unit", "values", "role"), [
+    ("n", "unknown", np.arange(100.0), "count"), ("n", "unknown", ACC, None), ("f", "Hz", RPM / 60.0, "frequency"),
+    ("speed", "mm/s", ACC, None), ("wind speed", "m/s", ACC, None), ("gyro x", "rad/s", ACC, None),
+    ("torsion", "deg/s", ACC, None), ("speed pulse", "V", ACC, "tacho"), ("v", "mm/s RMS", ACC, None),
+    ("a", "0.001 g", ACC, None), ("speed", "unknown", RPM, "speed"), ("n", "-", RPM, "speed"),
+])  # fmt: skip
+def test_what_is_a_speed_and_what_is_not(name, unit, values, role):
+    assert role_of(name, unit, values) == role
+
+
+def test_a_frequency_is_no_vibration_and_may_be_the_shafts(tmp_path):
+    path = written(tmp_path / "s.csv", "f [Hz]", RPM / 60.0)
+    report = analyse(path)
+    assert list(report.levels["channel"]) == ["a"]
+    assert any("--speed-channel 'f'" in note for note in report.notes)
+    assert analyse(path, speed_channel="f").speed == pytest.approx(RAD * RPM.mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("x0.001 g", 9.80665e-3), ("10^-3 g", 9.80665e-3), ("0.1 mm/s", 1e-4)])
+def test_multiples_of_units_are_these(unit, factor):
+    assert unit_dimension(unit)[1] == pytest.approx(factor)
+    with pytest.raises(SignalError, match=says("50 g")):
+        unit_dimension("50 g")
+    assert name_and_unit(f"a [{unit}]") == ("a", unit)
