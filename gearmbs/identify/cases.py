@@ -21,7 +21,7 @@ import numpy as np
 from gearmbs.identify.fit import SIMULATION_STEP, FitKeywords
 from gearmbs.identify.parameters import Fit, Free, IdentifyError
 from gearmbs.identify.problem import COARSER, Gains, LevelProblem
-from gearmbs.identify.stored import Stored
+from gearmbs.identify.stored import Levels, Stored
 from gearmbs.identify.tables import check_table, field_of, in_si
 
 if TYPE_CHECKING:
@@ -46,7 +46,6 @@ derivatives are to stand for the record's: they are then off by as little, which
 KEPT = 16
 """Motions that are kept for their derivatives: a search asks for those of the last ones."""
 
-Levels = dict[tuple[str, int], float]
 Key = tuple[str, tuple[float, ...]]
 
 
@@ -293,18 +292,21 @@ class CaseProblem(LevelProblem):
     def _slopes_of(self, key: Key) -> np.ndarray:
         """Return the derivatives of the logarithms of a case's rows of the table by the parameters."""
         name, p = key
-        case = self.case(name, p)
-        free = [self._as_of(item, name) for item in self.free]
-        rows, store = self._rows_of(name), self.store
-        if store is not None and (stored := store.slopes(case, free, rows, self.way)) is not None:
-            return stored
-        own = [k for k, item in enumerate(free) if item is not None]
-        slopes = np.zeros((len(rows), len(free)))
-        by_motion = self._slopes_of_motion(key, own)
-        for k in own:
-            slopes[:, k] = by_motion[k] if k in by_motion else self._difference(key, k)
+        case, rows, store = self.case(name, p), self._rows_of(name), self.store
+        free = {k: own for k, item in enumerate(self.free) if (own := self._as_of(item, name)) is not None}
+        known: dict[int, Levels] = {}
         if store is not None:
-            store.keep_slopes(case, free, rows, self.way, slopes)
+            stored = {k: store.slopes(case, item, self.way) for k, item in free.items()}
+            known = {k: found for k, found in stored.items() if found is not None}
+        new = [k for k in free if k not in known]
+        found = self._slopes_of_motion(key, new)
+        found |= {k: self._difference(key, k) for k in new if k not in found}
+        if store is not None:
+            for k, one in found.items():
+                store.keep_slopes(case, free[k], self.way, one)
+        slopes = np.zeros((len(rows), len(self.free)))
+        for k, one in (known | found).items():
+            slopes[:, k] = [one.get(row, np.nan) for row in rows]
         return slopes
 
     def _as_of(self, item: Free, name: str) -> Free | None:
@@ -318,8 +320,8 @@ class CaseProblem(LevelProblem):
         rows = zip(self.table["case"], self.components, self.table["harmonic"])
         return [(c, int(h)) for n, c, h in rows if n == name]
 
-    def _slopes_of_motion(self, key: Key, own: list[int]) -> dict[int, np.ndarray]:
-        """Return derivatives by the steady motion, by the numbers of the parameters it has some for."""
+    def _slopes_of_motion(self, key: Key, own: list[int]) -> dict[int, Levels]:
+        """Return derivatives of the logarithms of all levels by the steady motion, by the numbers of the parameters."""
         name, p = key
         known = self._known[key]
         if name in self._without or not known or not own:
@@ -342,13 +344,7 @@ class CaseProblem(LevelProblem):
         for k in own:
             if (reason := refused.get(f"p{k}")) is not None:
                 self._note(f"{self.free[k].name}: derivatives by differences: {reason}")
-        rows = self._rows_of(name)
-        return {
-            k: np.array([of[row] for row in rows])
-            for k in own
-            if f"p{k}" in found_by
-            for of in [motion.slopes(self.way, found_by[f"p{k}"])]
-        }
+        return {k: motion.slopes(self.way, found_by[f"p{k}"]) for k in own if f"p{k}" in found_by}
 
     def _check_alike(self, name: str, known: Levels, motion: Levels) -> None:
         """Note if the record of a case is not the steady motion whose derivatives would stand for its own."""
@@ -369,18 +365,20 @@ class CaseProblem(LevelProblem):
         ends = [end for end in (item.low, item.high) if end is not None]
         return 0.5 * (max(ends) - min(ends)) if len(ends) == 2 else 1.0
 
-    def _difference(self, key: Key, k: int) -> np.ndarray:
-        """Return the derivatives of the logarithms of a case's rows by one parameter, as central differences."""
+    def _difference(self, key: Key, k: int) -> Levels:
+        """Return the derivatives of the logarithms of a case's levels by one parameter, as central differences."""
         name, p = key
         if name in self._without:
             self._note(f"case {name!r}: derivatives by differences: {self._without[name]}")
         by = SIMULATION_STEP * self._size(k, p[k])
         sides = [(name, tuple(v + way * by * (j == k) for j, v in enumerate(p))) for way in (1.0, -1.0)]
         self._find(sides)
-        rows = self._rows_of(name)
+        above, below = (self._known[side] for side in sides)
         with np.errstate(all="ignore"):
-            above, below = (np.log([self._known[side].get(row, np.nan) for row in rows]) for side in sides)
-        return (above - below) / (2.0 * by)
+            return {
+                row: float((np.log(above[row]) - np.log(below[row])) / (2.0 * by))
+                for row in above.keys() & below.keys()
+            }
 
     def _note(self, line: str) -> None:
         if line not in self.notes:

@@ -14,7 +14,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gearmbs.identify.parameters import Fit, Free, IdentifyError, Scale
+from gearmbs.identify.parameters import Fit, Free, IdentifyError, NoValues, Scale
 from gearmbs.progress import staged
 
 # Derivatives of a noisy simulation by central differences, with a step that fits its noise, and what noise is left
@@ -192,9 +192,7 @@ def fit(
         if found is not None:
             attempts.append(found)
     if not attempts:
-        raise IdentifyError(
-            "fit: the model gives no finite values at any of the starts; give others, or narrower bounds"
-        )
+        raise NoValues("fit: the model gives no finite values at any of the starts; give others, or narrower bounds")
     attempts.sort(key=lambda a: a[1])
     z = attempts[0][0]
     if loss == "linear":

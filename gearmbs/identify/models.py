@@ -15,10 +15,12 @@ import numpy as np
 from gearmbs.dae.orbits import NoOrbit
 from gearmbs.dae.problem import ModelError
 from gearmbs.drivetrain import Drivetrain
-from gearmbs.identify.parameters import Free, IdentifyError, Scale
+from gearmbs.identify.parameters import Free, IdentifyError, Scale, in_numbers
 from gearmbs.identify.problem import Gains, LevelProblem, Problem
 from gearmbs.identify.tables import check_table
-from gearmbs.mechanism import Mechanism, forward_sensitivities, steady_motion, steady_sensitivities
+from gearmbs.mechanism import Mechanism, forward_sensitivities, simulate, steady_motion, steady_sensitivities
+from gearmbs.mechanism.solve.accuracy import chosen_accuracy
+from gearmbs.mechanism.solve.sensitivities import TIGHTER
 from gearmbs.units import QuantityLike, to_si
 
 if TYPE_CHECKING:
@@ -26,10 +28,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from gearmbs.dae.results.solution import Solution
+    from gearmbs.mechanism import Sensitivities
     from gearmbs.mechanism.solve.keywords import SensitivityOptions, SteadyOptions
 
 Result = str | Callable[["Solution"], Any]
 Build = Callable[..., Mechanism | Drivetrain]
+
+TRIED = 2
+"""How often derivatives along a run may be refused before they are no longer asked for: one value alone may leave out a
+part of the model, as a damping of zero does of an expression."""
 
 WHOLE = 1e-6
 """Part of a cycle by which a frequency times the period may miss a whole number: both are told to six digits."""
@@ -42,6 +49,7 @@ class _Models:
         self.builds, self.free = dict(builds), list(free)
         if not self.free or not all(isinstance(item, Free) for item in self.free):
             raise IdentifyError("free: give parameters as Free(name, start), whose names are arguments of the model")
+        self.free = [in_numbers(item) for item in self.free]
         if used := [item.name for item in self.free if item.also]:
             raise IdentifyError(f"free: {', '.join(used)}: also: belongs to cases; compute it inside the model")
         # refused here rather than after the simulations that come first
@@ -98,7 +106,7 @@ class MotionProblem(LevelProblem):
     model : callable or mapping of str to callable
         ``model(**parameters)`` returns a mechanism or a drivetrain; of several cases by their names.
     free : sequence of Free
-        Named as the model's arguments; numbers in SI.
+        Named as the model's arguments; in SI, or texts with units.
     results : mapping of str to str or callable
         By channel an expression in the function language of ADAMS, or what makes numbers of a solution, shape (m,).
     period : float or str, optional
@@ -274,7 +282,7 @@ class SignalProblem(Problem):
     model : callable or mapping of str to callable
         ``model(**parameters)`` returns a mechanism or a drivetrain.
     free : sequence of Free
-        Named as the model's arguments; numbers in SI.
+        Named as the model's arguments; in SI, or texts with units.
     results : mapping of str to str or callable
         By channel an expression in the function language of ADAMS, or what makes numbers of a solution, shape (m,), in
         the signal's unit.
@@ -308,6 +316,13 @@ class SignalProblem(Problem):
                 raise IdentifyError(f"signals: {name} has no dimensions time and channel; make one by make_signal")
             if float(one["time"][0]) < 0.0 or not np.isfinite(one.values).all():
                 raise IdentifyError(f"signals: {name}: times must not be negative, and all values finite")
+            times = one["time"].values.astype(float)
+            if not (np.diff(times) > 0.0).all():
+                k = int(np.argmin(np.diff(times) > 0.0))
+                raise IdentifyError(
+                    f"signals: {name}: time {times[k + 1]:g} s comes behind {times[k]:g} s; give times in a row, each "
+                    "later than the one before"
+                )
             _check_channels([str(c) for c in one["channel"].values], results)
         self.signals = given
         self._models = _Models(_by_case(model, list(given)), free)
@@ -319,7 +334,8 @@ class SignalProblem(Problem):
             else {str(c): sigma for s in given.values() for c in s["channel"].values}
         )
         self._sigma = {name: float(value) for name, value in by.items()}
-        self._known: dict[tuple[float, ...], tuple[np.ndarray, np.ndarray]] = {}
+        self._known: dict[tuple[float, ...], tuple[np.ndarray, np.ndarray | None]] = {}
+        self._refused = 0
         self.runs = 0
 
     @property
@@ -342,46 +358,90 @@ class SignalProblem(Problem):
         """Return the predicted values for several parameter vectors; NaN where a run fails."""
         return [self._found(p)[0] for p in points]
 
-    def jacobian(self, p: np.ndarray) -> np.ndarray:
-        """Return their derivatives, shape (m, n)."""
+    def jacobian(self, p: np.ndarray) -> np.ndarray | None:
+        """Return their derivatives, shape (m, n); None where a run has none but differences."""
         return self._found(p)[1]
 
-    def _found(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _found(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         key = tuple(map(float, p))
         if key not in self._known:
             self._known[key] = self._run(key)
         return self._known[key]
 
-    def _run(self, p: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-        """Return predictions and derivatives from one run of each case."""
+    def _run(self, p: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return predictions and derivatives from one run of each case; None where a run has no derivatives."""
         values: list[np.ndarray] = []
-        slopes: list[np.ndarray] = []
+        slopes: list[np.ndarray] | None = []
         for name, signal in self.signals.items():
             t = signal["time"].values.astype(float)
-            parameters = self._models.parameters(p)
             later = t > 0.0
             times = np.concatenate([[0.0], t[later]])
-            self.runs += 1
-            try:
-                with warnings.catch_warnings():
-                    warnings.filterwarnings("ignore", message=".*changes no number of the model")
-                    found = forward_sensitivities(
-                        self._models.build(name), parameters, times[-1], t_eval=times, **self._settings
-                    )
-            except ModelError as error:
-                if not any(note.startswith("a run failed") for note in self.notes):
-                    self.notes.append(f"a run failed: {error}")
-                lost = signal.size
-                values.append(np.full(lost, np.nan))
-                slopes.append(np.full((lost, len(self.free)), np.nan))
-                continue
             kept = slice(0 if not later[0] else 1, None)
+            try:
+                found, solution = self._simulated(name, p, times)
+            except ModelError as error:
+                self._note(f"a run failed: {error}")
+                values.append(np.full(signal.size, np.nan))
+                if slopes is not None:
+                    slopes.append(np.full((signal.size, len(self.free)), np.nan))
+                continue
+            if found is None:
+                slopes = None
             for channel in map(str, signal["channel"].values):
                 result = self.results[channel]
-                at = found.solution.evaluate(result) if isinstance(result, str) else result(found.solution)
+                at = solution.evaluate(result) if isinstance(result, str) else result(solution)
                 values.append(np.asarray(at, dtype=float)[kept])
-                slopes.append(np.stack([found.derivative(k, result)[kept] for k in parameters], axis=1))
-        return np.concatenate(values), np.concatenate(slopes)
+                if slopes is not None and found is not None:
+                    slopes.append(np.stack([found.derivative(f.name, result)[kept] for f in self.free], axis=1))
+        return np.concatenate(values), None if slopes is None else np.concatenate(slopes)
+
+    def _simulated(self, name: str, p: tuple[float, ...], times: np.ndarray) -> tuple[Sensitivities | None, Solution]:
+        """Return the run of a case with its derivatives; without them if they are refused, `TRIED` times or now.
+
+        Raises
+        ------
+        ModelError
+            If it fails without them, too.
+        """
+        if self._refused >= TRIED:
+            return None, self._plain(name, p, times)
+        self.runs += 1
+        try:
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", message=".*changes no number of the model")
+                found = forward_sensitivities(
+                    self._models.build(name), self._models.parameters(p), times[-1], t_eval=times, **self._settings
+                )
+            return found, found.solution
+        except ModelError as error:
+            solution = self._plain(name, p, times)
+            self._refused += 1
+            self._note(f"derivatives by differences: {error}")
+            return None, solution
+
+    def _plain(self, name: str, p: tuple[float, ...], times: np.ndarray) -> Solution:
+        """Return the run of a case without derivatives, at the tolerance that they would have.
+
+        Raises
+        ------
+        ModelError
+            If it fails.
+        """
+        mechanism = self._models.build(name)(**{key: value for key, (value, _) in self._models.parameters(p).items()})
+        settings = dict(self._settings)
+        given, scale = settings.pop("tol"), settings.pop("rate_scale", None)
+        usual, scale = chosen_accuracy(mechanism, (0.0, times[-1]), given, scale)
+        tol = TIGHTER * usual if given is None else usual
+        self.runs += 1
+        solution = simulate(mechanism, times[-1], t_eval=times, tol=tol, rate_scale=scale, **settings)
+        if not solution.result.success:
+            raise ModelError(solution.message)
+        return solution
+
+    def _note(self, line: str) -> None:
+        """Note what kind of thing happened, once."""
+        if not any(note.startswith(line[: line.index(":")]) for note in self.notes):
+            self.notes.append(line)
 
 
 def order_table(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +33,10 @@ class IdentifyError(ValueError):
     """A fit that cannot be made; the message names what is wrong and the remedy."""
 
 
+class NoValues(IdentifyError):
+    """A fit whose model gives no values at any of its starts."""
+
+
 @dataclass(frozen=True)
 class Free:
     """A parameter that is to be found.
@@ -42,7 +46,8 @@ class Free:
     name : str
         For cases the path of a field, as "contact.depth".
     start : float or str
-        Where the search begins; texts with units where the problem knows the unit.
+        Where the search begins; texts with units are read in SI where a model of one's own is fitted, and in the
+        field's unit where a case is. `fit` takes numbers.
     low, high : float or str, optional
         Bounds; default none, and with ``log`` a hundredth and a hundred times the start.
     log : bool
@@ -66,6 +71,31 @@ class Free:
             raise IdentifyError(
                 f"{self.name}: start = {self.start:g} has no logarithm; give a positive one or log=False"
             )
+
+
+def in_numbers(item: Free) -> Free:
+    """Return a parameter whose texts are numbers in SI.
+
+    Raises
+    ------
+    IdentifyError
+        For texts that are no quantity, or whose number in SI hangs on what the model takes: turns or radians.
+    """
+    from gearmbs.units import readings
+
+    def number(what: str, given: Any) -> Any:
+        if not isinstance(given, str):
+            return given
+        found = readings(given)
+        if len({*found.values()}) == 1:
+            return next(iter(found.values()))
+        meant = " or ".join(f"{value:g} in {unit}" for unit, value in found.items())
+        raise IdentifyError(
+            f"{item.name}: {what} = {given!r} "
+            + (f"may be {meant}: give the number that the model takes" if found else "is no number with a unit of SI")
+        )
+
+    return replace(item, **{what: number(what, getattr(item, what)) for what in ("start", "low", "high")})
 
 
 @dataclass(frozen=True)
@@ -104,10 +134,13 @@ class Scale:
         Raises
         ------
         IdentifyError
-            If a start is outside its bounds.
+            If a start is outside its bounds, or a text.
         """
         low, high = [], []
         for f in self.free:
+            for what, given in (("start", f.start), ("low", f.low), ("high", f.high)):
+                if isinstance(given, str):
+                    raise IdentifyError(f"{f.name}: {what} = {given!r} is a text; give the number that the model takes")
             a = f.low if f.low is not None else (0.01 * f.start if f.log else -np.inf)
             b = f.high if f.high is not None else (100.0 * f.start if f.log else np.inf)
             if not a < f.start < b:

@@ -14,7 +14,7 @@ import numpy as np
 
 from gearmbs.identify.fit import SIMULATION_STEP, FitKeywords, central, fit, noise_of_columns
 from gearmbs.identify.identifiability import LIMIT, Identifiability
-from gearmbs.identify.parameters import Fit, Free, IdentifyError, Scale
+from gearmbs.identify.parameters import Fit, Free, IdentifyError, NoValues, Scale
 from gearmbs.identify.tables import groups_of
 
 if TYPE_CHECKING:
@@ -87,8 +87,12 @@ class Problem(ABC):
         else:
             matrix = own / self.sigma[:, None] * np.where(scale.logs, at, sizes)
         if not np.isfinite(matrix).all():
-            raise IdentifyError("the simulations fail about the start; give another one")
+            raise IdentifyError(f"the simulations fail about the start; give another one{self._causes()}")
         return matrix, own is not None
+
+    def _causes(self) -> str:
+        """Return what is known of why there are no predictions, to follow a sentence that says so."""
+        return "".join(f". {note[:1].upper()}{note[1:]}" for note in self.notes)
 
     def _many(self, points: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return predictions at several z over their standard deviations."""
@@ -138,16 +142,19 @@ class Problem(ABC):
         The step of differences and the end of the search are those that fit the integrator's noise.
         """
         chosen: FitKeywords = {"step": SIMULATION_STEP, "tolerance": 1e-4, **settings}
-        found = fit(
-            lambda p: self.predictions([p])[0],
-            self.measured,
-            self.free,
-            sigma=self.sigma,
-            many=self.predictions,
-            jacobian=self.jacobian,
-            lost=self.lost,
-            **chosen,
-        )
+        try:
+            found = fit(
+                lambda p: self.predictions([p])[0],
+                self.measured,
+                self.free,
+                sigma=self.sigma,
+                many=self.predictions,
+                jacobian=self.jacobian,
+                lost=self.lost,
+                **chosen,
+            )
+        except NoValues as error:
+            raise NoValues(f"{error}{self._causes()}") from None
         return replace(found, notes=tuple(self.notes))
 
 

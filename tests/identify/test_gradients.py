@@ -104,6 +104,15 @@ def test_a_fit_goes_on_from_what_was_kept(tmp_path):
     again = CaseProblem(table, cases, free, way="orders", store=tmp_path)
     assert (again.fit().values == done.values).all()
     assert first.simulations > 0 == again.simulations
+    for rows, wanted in ((table[::-1], free), (table, free[::-1])):
+        other = CaseProblem(rows, cases, wanted, way="orders", store=tmp_path)
+        np.testing.assert_allclose(sorted(other.fit().values), sorted(done.values), rtol=1e-6)
+        assert other.simulations == 0
+    # of fewer rows the search goes other ways, but begins where this one did; one parameter of two was derived, too
+    for rows, wanted in ((table[:6], free), (table, free[:1])):
+        fewer = CaseProblem(rows, cases, wanted, way="orders", store=tmp_path)
+        fewer.derivatives([item.start for item in wanted])
+        assert fewer.simulations == (0 if len(wanted) == 2 else 1)
     files = sorted(tmp_path.iterdir())
     files[0].write_text("{")
     damaged = CaseProblem(table, cases, free, way="orders", store=tmp_path)

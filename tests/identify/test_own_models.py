@@ -9,7 +9,7 @@ import xarray as xr
 
 import gearmbs as gm
 from gearmbs.gears import planetary, planetary_mechanism
-from gearmbs.identify import Free, IdentifyError, MotionProblem, SignalProblem, order_table
+from gearmbs.identify import Free, IdentifyError, MotionProblem, SignalProblem, fit, order_table
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals import make_signal
 from tests.says import says
@@ -173,3 +173,57 @@ def test_frequencies_are_of_channels_that_there_are_and_may_be_texts():
         assert level(frequency) == pytest.approx(expected, rel=1e-4)
     with pytest.raises(IdentifyError, match=says("frequency", "X", "x")):
         level({"X": 2.0 / np.pi})
+
+
+def measured_signal(t, damping=DAMPING):
+    w = np.sqrt(STIFFNESS - damping**2 / 4.0)
+    values = np.exp(-0.5 * damping * t) * np.sin(w * t) / w
+    return xr.DataArray(values[:, None], dims=("time", "channel"), coords={"time": t, "channel": ["x"]})
+
+
+@pytest.mark.slow
+def test_a_fit_that_finds_no_values_says_why():
+    t = np.arange(20) / 20.0
+
+    def broken(stiffness, damping):
+        return slide("-SQRT(-1)")
+
+    problem = SignalProblem(measured_signal(t), broken, FREE, {"x": "DX(I,J)"}, sigma=0.01)
+    for asked in (problem.fit, problem.derivatives):
+        with pytest.raises(IdentifyError, match=says("give", "A run failed", "SQRT(-1)")):
+            asked()
+
+
+def test_times_that_fall_are_refused_before_anything_runs():
+    t = np.array([0.0, 0.2, 0.1])
+    with pytest.raises(IdentifyError, match=says("signals: measured", "0.1 s", "0.2 s", "later")):
+        SignalProblem(measured_signal(t), swinging, FREE, {"x": "DX(I,J)"}, sigma=0.01)
+
+
+def test_starts_with_units_are_read_in_si_or_refused():
+    t = np.arange(20) / 20.0
+
+    def problem(start, **bounds):
+        return SignalProblem(
+            measured_signal(t), swinging, [Free("stiffness", start, **bounds), FREE[1]], {"x": "DX(I,J)"}, sigma=0.01
+        )
+
+    read = problem("0.007 N/mm", low="1 N/m", high=30.0).free[0]
+    assert (read.start, read.low, read.high) == pytest.approx((7.0, 1.0, 30.0))
+    with pytest.raises(IdentifyError, match=says("stiffness", "7 pumps", "unit")):
+        problem("7 pumps")
+    with pytest.raises(IdentifyError, match=says("stiffness", "25 Hz", "157.08 in rad/s")):
+        problem("25 Hz")
+    with pytest.raises(IdentifyError, match=says("low", "1 N/m", "number")):
+        fit(lambda p: p, [1.0], [Free("a", 2.0, low="1 N/m")])
+
+
+@pytest.mark.slow
+def test_a_start_without_derivatives_takes_differences_there():
+    """A damping of zero has no place in the text of a force: that start has no derivative by it, its neighbours do."""
+    t = np.arange(60) / 20.0
+    free = [Free("stiffness", 8.0), Free("damping", 0.0, low=-1.0, high=1.0, log=False)]
+    problem = SignalProblem(measured_signal(t), swinging, free, {"x": "DX(I,J)"}, sigma=0.01)
+    found = problem.fit()
+    np.testing.assert_allclose(found.values, [STIFFNESS, DAMPING], rtol=1e-4)
+    assert any("differences" in note and "damping" in note for note in found.notes)
