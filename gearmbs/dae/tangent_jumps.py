@@ -93,8 +93,8 @@ def _size(tr, i, moved):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def look_for_jumps(functions, tr, plan, factors, k, yp, idata, rdata, work):
-    """Look for jumps in the step to the newest point, and note what each moves the sensitivities by.
+def look_for_jumps(functions, tr, plan, factors, k, steps, yp, idata, rdata, work):
+    """Look for jumps in the last steps, to the newest point, and note what each moves the sensitivities by.
 
     Parameters
     ----------
@@ -102,6 +102,8 @@ def look_for_jumps(functions, tr, plan, factors, k, yp, idata, rdata, work):
         As of `gearmbs.dae.tangents.follow_run`, with the newest point in the history.
     k : int
         Order of the polynomial.
+    steps : int
+        At most k, so that it goes through their ends.
     yp : ndarray, shape (n,)
         Rates at the newest point, with which the residual is looked at.
     idata, rdata, work : ndarray
@@ -111,9 +113,9 @@ def look_for_jumps(functions, tr, plan, factors, k, yp, idata, rdata, work):
     difference, found = tr.last_seen, tr.first_seen
     for i in range(n):
         tr.most_rate[i] = max(tr.most_rate[i], abs(yp[i]))
-    # a jump right at the end belongs to the step behind it, one right at the start to this one
+    # a jump right at the end belongs to the step behind it, one right at the start to these
     lows, highs = np.empty(LOOKS + 2), np.empty(LOOKS + 2)
-    lows[0] = tr.times[1] - APART * EPS * abs(tr.times[1])
+    lows[0] = tr.times[steps] - APART * EPS * abs(tr.times[steps])
     highs[0] = tr.times[0] - APART * EPS * abs(tr.times[0])
     waiting, looks = 1, 0
     while waiting > 0 and looks < LOOKS:

@@ -52,6 +52,8 @@ class Track(Struct):
         Largest rate of each unknown so far; 1 for those whose rates are looked at for jumps, else 0.
     between, first_seen, seen_between, last_seen : ndarray, shape (n,)
         Scratch of looking for jumps.
+    sides, solved : ndarray, shape (SIDES, n) and (n SIDES,)
+        Right-hand sides of some parameters, then what they gave, and scratch of solving for them at once.
     lost : ndarray, shape (p, n)
         Largest jump of each sensitivity that has not been followed.
     lost_at : ndarray, shape (p,)
@@ -64,8 +66,10 @@ class Track(Struct):
     has_hook: bool
     nonlinear_rates: bool
     jumps: bool  # are looked for
+    unseen: int  # steps that were not yet looked at
     growth_limit: float
     gamma: float  # of the matrix that is factored
+    looked: float  # time at which it was, s
     times: Vector
     y: Matrix
     s: Matrix
@@ -96,6 +100,8 @@ class Track(Struct):
     first_seen: Vector
     seen_between: Vector
     last_seen: Vector
+    sides: Matrix
+    solved: Vector
     lost: Matrix
     lost_at: Vector
 

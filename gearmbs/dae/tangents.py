@@ -31,6 +31,7 @@ from numba import float64, int64
 
 from gearmbs.dae.integrators.bdf import HISTORY, MAX_ORDER, error_constant
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, SingularMatrixError, analyse
+from gearmbs.dae.linalg.several import SIDES, solve_sides
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, factor, new_factors, solve
 from gearmbs.dae.problem import HISTORY_CHANGED, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, DenseOutput, lagrange_weights
@@ -50,6 +51,10 @@ EVEN, EVEN_ORDER = 0.99, 4
 """Part of the longest step allowed from which one was limited by that, and the order taken there."""
 SHORTER = 0.25
 """Ratio of a step of order one to the one before it from which a run has started afresh."""
+TOGETHER = 3
+"""Steps that are looked at for jumps at once."""
+FEW = 2
+"""Parameters up to which solving for one after the other is faster than for `SIDES` at once."""
 CHUNK = 2048
 """Points at a time: their unknowns are laid out for the compiled loop."""
 NO_SOLUTION = (
@@ -71,6 +76,49 @@ SCRATCH = (
 )  # fmt: skip
 """Members of a track that start as zeros, one of each unknown."""
 _VEC, _MAT, _IVEC = float64[::1], float64[:, ::1], int64[::1]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _foretell(functions, tr, k, past, p, side, y, yp, idata, rdata, work):
+    """Write what the past says of a parameter's sensitivities to their row, and the right-hand side of their equations.
+
+    Parameters
+    ----------
+    functions, tr, k, y, yp, idata, rdata, work
+        As of `_step`, with the residual itself in ``minus``, and in ``value`` the weights with which ``past`` points
+        foretell the next.
+    past : int
+    p, side : int
+        The parameter, and the row of ``sides`` that takes its right-hand side.
+    """
+    n, count = tr.scale.shape[0], tr.parameters
+    s, slope, foretold, plus = tr.s, tr.slope, tr.rate, tr.sides[side]
+    for i in range(n):
+        foretold[i] = slope[1] * s[count + p, i]
+    for j in range(2, k + 1):
+        for i in range(n):
+            foretold[i] += slope[j] * s[j * count + p, i]
+    # what the polynomial through the past says tells the error
+    for i in range(n):
+        s[p, i] = 0.0
+    for j in range(past):
+        w = tr.value[j]
+        for i in range(n):
+            s[p, i] += w * s[(j + 1) * count + p, i]
+    by = BY
+    if tr.nonlinear_rates:
+        by = min(BY, size_of_move(tr, s, p))
+    first, last = tr.first[p], tr.first[p + 1]
+    for q in range(first, last):
+        tr.kept[q] = rdata[tr.place[q]]
+        rdata[tr.place[q]] += by * tr.weight[q]
+    for i in range(n):
+        tr.yp_moved[i] = yp[i] + by * foretold[i]
+    functions.residual(tr.looked, y, tr.yp_moved, plus, idata, rdata, work)
+    for q in range(first, last):
+        rdata[tr.place[q]] = tr.kept[q]
+    for i in range(n):
+        plus[i] = (tr.minus[i] - plus[i]) / by
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -105,7 +153,7 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
     lagrange_weights(t, nodes, k + 1, tr.value, tr.slope)
     slope = tr.slope
     gamma = slope[0]
-    tr.gamma = gamma
+    tr.gamma, tr.looked = gamma, t
     functions.jacobian(t, y, yp, gamma, tr.vals, idata, rdata, work)
     growth = factor(plan, factors, tr.vals)
     if not growth <= tr.growth_limit:
@@ -114,43 +162,31 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
     past = min(k + 1, tr.n_past)
     for j in range(past):
         nodes[j] = times[j + 1]
-    foretold = tr.rate
-    for p in range(count):
-        for i in range(n):
-            v = 0.0
-            for j in range(1, k + 1):
-                v += slope[j] * s[j * count + p, i]
-            foretold[i] = v
-        # what the polynomial through the past says tells the error
-        for i in range(n):
-            s[p, i] = 0.0
-        for j in range(past):
-            w = 1.0
-            for m in range(past):
-                if m != j:
-                    w *= (t - nodes[m]) / (nodes[j] - nodes[m])
+    for j in range(past):
+        w = 1.0
+        for m in range(past):
+            if m != j:
+                w *= (t - nodes[m]) / (nodes[j] - nodes[m])
+        tr.value[j] = w
+    told = error_constant(t, nodes, k) if past > k else 0.5
+    for begin in range(0, count, SIDES):
+        end = min(begin + SIDES, count)
+        for p in range(begin, end):
+            _foretell(functions, tr, k, past, p, p - begin, y, yp, idata, rdata, work)
+        if end - begin > FEW:
+            for side in range(end - begin, SIDES):
+                for i in range(n):
+                    tr.sides[side, i] = 0.0
+            solve_sides(plan, factors, tr.sides, tr.solved)
+        else:
+            for side in range(end - begin):
+                solve(plan, factors, tr.sides[side], tr.sides[side])
+        for p in range(begin, end):
+            found = tr.sides[p - begin]
             for i in range(n):
-                s[p, i] += w * s[(j + 1) * count + p, i]
-        by = BY
-        if tr.nonlinear_rates:
-            by = min(BY, size_of_move(tr, s, p))
-        first, last = tr.first[p], tr.first[p + 1]
-        for q in range(first, last):
-            tr.kept[q] = rdata[tr.place[q]]
-            rdata[tr.place[q]] += by * tr.weight[q]
-        for i in range(n):
-            tr.yp_moved[i] = yp[i] + by * foretold[i]
-        functions.residual(t, y, tr.yp_moved, tr.plus, idata, rdata, work)
-        for q in range(first, last):
-            rdata[tr.place[q]] = tr.kept[q]
-        for i in range(n):
-            tr.plus[i] = (tr.minus[i] - tr.plus[i]) / by
-        solve(plan, factors, tr.plus, tr.found)
-        told = error_constant(t, nodes, k) if past > k else 0.5
-        for i in range(n):
-            tr.error[p, i] = max(tr.error[p, i], told * abs(tr.found[i] - s[p, i]))
-            s[p, i] = tr.found[i]
-            tr.largest[p, i] = max(tr.largest[p, i], abs(s[p, i]))
+                tr.error[p, i] = max(tr.error[p, i], told * abs(found[i] - s[p, i]))
+                s[p, i] = found[i]
+                tr.largest[p, i] = max(tr.largest[p, i], abs(s[p, i]))
     return True
 
 
@@ -270,7 +306,13 @@ def follow_run(
                     for p in range(count):
                         tr.s[count + p, i] = tr.s[p, i]
         if tr.jumps:
-            look_for_jumps(functions, tr, plan, factors, k, yp[m], idata, rdata, work)
+            tr.unseen += 1
+            # as many steps at once as the next polynomial would not go through, and none across a restart
+            following = m + 1
+            goes_on = following < times.shape[0] and flags[following] & AFRESH == 0
+            if tr.unseen == TOGETHER or not goes_on or orders[following] <= tr.unseen:
+                look_for_jumps(functions, tr, plan, factors, k, tr.unseen, yp[m], idata, rdata, work)
+                tr.unseen = 0
         tr.n_past = min(past + 1, HISTORY)
         _write_outputs(tr, k, outputs, s_out, sp_out)
         if tr.has_hook and flags[m] & END_OF_STEP != 0:
@@ -466,8 +508,10 @@ def _track(problem: DAEProblem, directions: list[Direction], jumps: bool) -> Tra
         has_hook=problem.hook is not None,
         nonlinear_rates=problem.nonlinear_rates,
         jumps=jumps,
+        unseen=0,
         growth_limit=GROWTH_LIMIT,
         gamma=0.0,
+        looked=0.0,
         times=np.zeros(HISTORY),
         y=np.zeros((HISTORY, n)),
         s=np.zeros((HISTORY * count, n)),
@@ -487,6 +531,8 @@ def _track(problem: DAEProblem, directions: list[Direction], jumps: bool) -> Tra
         watched=np.asarray(problem.error_mask & problem.differential, dtype=float),
         lost=np.zeros((count, n)),
         lost_at=np.zeros(count),
+        sides=np.zeros((SIDES, n)),
+        solved=np.zeros(n * SIDES),
         **{name: np.zeros(n) for name in SCRATCH},
         **{name: np.zeros(HISTORY + 1) for name in ("value", "slope", "nodes")},
     )
