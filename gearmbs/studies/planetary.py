@@ -27,7 +27,7 @@ from gearmbs.studies.case.section import CaseError
 from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.run.accuracy import asked_accuracy
 from gearmbs.studies.run.recorder import TURN_BEFORE
-from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines
+from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines, time_apart
 from gearmbs.units import Quantity, QuantityLike, to_si
 
 MEMBERS = ("sun", "carrier", "ring")
@@ -163,7 +163,8 @@ def run_planetary(
         Over ``time``: ``speed`` (member), ``force`` of the meshes with the sun and the ring (mesh, planet), ``share``
         of the load, ``ring_sensor``, the forces on the ring weighted by the planets' path past a sensor at angle 0,
         ``carrier_angle``, and with a rim that bends ``rim_velocity``, its radial velocity at angle 0.
-        Attributes hold the frequencies of `PlanetarySet.frequencies`. With an accuracy ``mesh_rms``, the RMS of the
+        Attributes hold the frequencies of `PlanetarySet.frequencies`, and ``record_apart``, the part of the time behind
+        the run-up in which the flanks of a mesh were apart. With an accuracy ``mesh_rms``, the RMS of the
         first three mesh harmonics of each force, and ``mesh_rms_error``, their numerical errors, too.
 
     Raises
@@ -176,7 +177,7 @@ def run_planetary(
     Warns
     -----
     UserWarning
-        Of an accuracy that was not reached.
+        Of an accuracy that was not reached, and of flanks that came apart, so that other motions may exist.
     """
     if accuracy is None:
         return _run(run, progress)[0]
@@ -190,13 +191,19 @@ def run_planetary(
     count = 1 if gears.ideal is not None else max(pair.face_slices for pair in pairs)
     slices = {} if count == 1 else {"set": count}
 
+    rate = run.rate * OVERSAMPLING
+    first, last = _samples(run)
+    half = (last + 1 - first) // 2
+    orders = np.arange(1, HARMONICS + 1)
+    names = [f"force of {name}" for name in _meshes(gears)]
+
     def lines(precise: Precise) -> Lines:
         sliced = precise.slices.get("set", count)
         one = run if sliced == count else replace(run, gears=replace(gears, slices=sliced))
-        record, forces = _run(replace(one, tolerance=precise.tolerance), progress)
+        # one sample more than the half, lest rounding left one out
+        duration = half / rate + 1.0 / rate if precise.half else run.duration
+        record, forces = _run(replace(one, tolerance=precise.tolerance, duration=duration), progress)
         frequency = abs(record.attrs["frequency_mesh"])
-        half = forces.shape[0] // 2
-        rate = run.rate * OVERSAMPLING
         if half * frequency < MIN_PERIODS * rate or not HARMONICS * frequency < 0.5 * rate:
             raise CaseError(
                 f"{gears.name}: accuracy = {accuracy!r}: half of operation.duration = {run.duration:g} s has "
@@ -204,11 +211,11 @@ def run_planetary(
                 f"{2.0 * (MIN_PERIODS + 1) / max(frequency, 1e-30):.3g} s or more, and a rate above "
                 f"{2.1 * HARMONICS * frequency / OVERSAMPLING:.6g} Hz"
             )
-        orders = np.arange(1, HARMONICS + 1)
 
         def levels(part: np.ndarray) -> np.ndarray:
             return np.abs(harmonic_amplitudes(part, rate, frequency, orders)).T[:, None, :] / np.sqrt(2.0)
 
+        parts = [forces[:half]] if precise.half else [forces[:half], forces[half:]]
         whole = levels(forces)
         record["mesh_rms"] = (
             ("mesh", "planet", "harmonic"),
@@ -216,11 +223,14 @@ def run_planetary(
             {"units": "N", "long_name": "RMS of the mesh harmonics of the forces of the teeth"},
         )
         record.coords["harmonic"] = orders
-        return Lines(record, whole, np.stack([levels(forces[:half]), levels(forces[half:])]))
+        apart = time_apart(np.arange(half) / rate, forces[:half])
+        return Lines(
+            record, names, whole, np.stack([levels(one) for one in parts]), apart, record.attrs["record_apart"]
+        )
 
     groups = np.zeros(2 * gears.planets, dtype=int)
-    first = Precise(WITHOUT_PLAY, slices)
-    return accurate_lines(lines, first, wanted, groups, "mesh_rms", f"planetary set '{gears.name}'")
+    precise = Precise(run.used_tolerance, slices)
+    return accurate_lines(lines, precise, wanted, groups, "mesh_rms", f"planetary set '{gears.name}'")
 
 
 def _run(run: PlanetaryRun, progress: Callable[[float], None] | None) -> tuple[xr.Dataset, np.ndarray]:
@@ -234,7 +244,7 @@ def _run(run: PlanetaryRun, progress: Callable[[float], None] | None) -> tuple[x
     mechanism = run.mechanism()
     planets = range(1, gears.planets + 1)
     # mesh forces have corners: what the sensor hears is filtered before it is sampled
-    time, told = _told(run, mechanism, progress)
+    time, told, apart = _told(run, mechanism, progress)
     kept = slice(None, None, OVERSAMPLING)
     both = {"sun": told["sun"], "ring": told["ring"]}
     motion: dict[str, Any] = {}
@@ -276,6 +286,7 @@ def _run(run: PlanetaryRun, progress: Callable[[float], None] | None) -> tuple[x
         attrs={
             "title": gears.name,
             "sampling_rate": run.rate,
+            "record_apart": apart,
             **{f"law_{mesh}": gears.law(mesh) for mesh in ("sun", "ring")},
             "teeth": [gears.sun.teeth, gears.planet.teeth, gears.ring.teeth],
             **({"planet_angles": [float(a) for a in gears.angles or ()]} if plain else {}),
@@ -287,8 +298,11 @@ def _run(run: PlanetaryRun, progress: Callable[[float], None] | None) -> tuple[x
 
 def _told(
     run: PlanetaryRun, mechanism: Mechanism, progress: Callable[[float], None] | None
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+) -> tuple[np.ndarray, dict[str, np.ndarray], float]:
     """Simulate a set; return times of the record, `OVERSAMPLING` at its rate, and what it is made from there.
+
+    The third is the part of the time behind the run-up in which the flanks of a mesh were apart, with a rim that bends
+    of that of the record: the largest of all meshes.
 
     Mesh forces and motions are those of the integrator's own steps, between which they are interpolated; a rim that
     bends has to be evaluated, which is done at these times alone.
@@ -299,7 +313,7 @@ def _told(
         If the integration does not reach its end.
     """
     fine, begin = run.rate * OVERSAMPLING, run.run_up + run.settling
-    first, last = int(np.ceil(begin * fine - 0.5)), int(np.floor((begin + run.duration) * fine + 1e-6))
+    first, last = _samples(run)
     recorder = _Recorder(run, mechanism, first / fine - AHEAD / fine)
     options: dict[str, Any] = {"tol": run.used_tolerance}
     if run.rim is None:
@@ -313,13 +327,26 @@ def _told(
         raise RuntimeError(f"{run.gears.name}: {solution.message}")
     if run.rim is None:
         time = np.arange(first, last + 1) / fine
-        return time, recorder.at(time)
+        return time, recorder.at(time), recorder.apart
     before = _rows_before(run, solution.t[:first])
     # all bodies and forces at all outputs would need far more memory than what is wanted of them
     for part in solution.parts(np.concatenate([before, np.arange(first, last + 1)])):
         recorder.take(part)
-    told = recorder.joined()
-    return solution.t[first : last + 1], {name: values[before.size :] for name, values in told.items()}
+    told = {name: values[before.size :] for name, values in recorder.joined().items()}
+    time = solution.t[first : last + 1]
+    return time, told, time_apart(time, np.concatenate([told["sun"], told["ring"]], axis=1))
+
+
+def _samples(run: PlanetaryRun) -> tuple[int, int]:
+    """Return the numbers of the first and the last sample of a record, `OVERSAMPLING` at its rate."""
+    fine, begin = run.rate * OVERSAMPLING, run.run_up + run.settling
+    return int(np.ceil(begin * fine - 0.5)), int(np.floor((begin + run.duration) * fine + 1e-6))
+
+
+def _meshes(gears: PlanetarySet) -> list[str]:
+    """Return the names of the meshes, those with the sun first."""
+    planets = range(1, gears.planets + 1)
+    return [name.format(k) for name in ("sun-planet {}", "planet {}-ring") for k in planets]
 
 
 AHEAD = 4
@@ -328,10 +355,8 @@ AHEAD = 4
 
 def _watched(run: PlanetaryRun) -> list[tuple[str, str]]:
     """Return what a record takes from the integrator's own steps."""
-    planets = range(1, run.gears.planets + 1)
-    meshes = [name.format(k) for name in ("sun-planet {}", "planet {}-ring") for k in planets]
     spins = [("angular_velocity", member) for member in MEMBERS]
-    return [*(("diagnostics", mesh) for mesh in meshes), ("orientation", "carrier"), *spins]
+    return [*(("diagnostics", mesh) for mesh in _meshes(run.gears)), ("orientation", "carrier"), *spins]
 
 
 class _Recorder:
@@ -350,15 +375,37 @@ class _Recorder:
         self._times: list[np.ndarray] = []
         self._parts: list[dict[str, np.ndarray]] = []
         self._turned = 0.0
+        self._apart = np.zeros(2 * run.gears.planets)
+        self._carried = np.zeros(2 * run.gears.planets, dtype=bool)
+        self._behind = 0.0
+        self._last: np.ndarray | None = None
+
+    @property
+    def apart(self) -> float:
+        """Part of the time behind the run-up in which the flanks of a mesh were apart, largest of those that carry."""
+        return float(self._apart[self._carried].max(initial=0.0)) / self._behind if self._behind > 0.0 else 0.0
 
     def take(self, part: Solution) -> None:
         """Take the next part."""
         angle = np.unwrap(np.concatenate([[self._turned], _angle(part, "carrier")]))[1:]
         self._turned = float(angle[-1])
+        if part.t[-1] < self._run.run_up and self._run.rim is None:
+            return
+        wanted = _wanted(self._run, self._mechanism, part)
+        self._add_apart(part.t, np.concatenate([wanted["sun"], wanted["ring"]], axis=1))
         if part.t[-1] < self._begin and self._run.rim is None:
             return
         self._times.append(part.t.copy())
-        self._parts.append({**_wanted(self._run, self._mechanism, part), "carrier angle": angle})
+        self._parts.append({**wanted, "carrier angle": angle})
+
+    def _add_apart(self, t: np.ndarray, forces: np.ndarray) -> None:
+        """Count the times in which each mesh carries nothing."""
+        steps = np.diff(t, prepend=self._last if self._last is not None else t[:1])
+        steps[t <= self._run.run_up] = 0.0
+        self._last = t[-1:].copy()
+        self._behind += float(steps.sum())
+        self._apart += steps @ (forces == 0.0)
+        self._carried |= (forces > 0.0).any(axis=0)
 
     def joined(self) -> dict[str, np.ndarray]:
         """Return what was taken, by name."""

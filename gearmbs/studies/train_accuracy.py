@@ -1,9 +1,13 @@
 """Records of drivetrains and planetary sets whose mesh harmonics are as accurate as asked, and tell how accurate.
 
-As of a case (`gearmbs.studies.run.accuracy`) each run has a twin over the same time, whose tolerance is `COARSER` times
-as large and which has half as many slices of each face. What the two differ by bounds the error of steps and slices.
-Trains have no period that all their parts share: to this comes what the two halves of a record differ by, half of which
-their mean, the record, is off by if what makes them differ is chance, and more than which if it dies out.
+As of a case (`gearmbs.studies.run.accuracy`) each run has a twin whose tolerance is a decade larger and which has half
+as many slices of each face. It ends in the middle of the record: what the first half of the run and the twin differ by
+bounds the error of steps and slices. Trains have no period that all their parts share: to this comes what the two
+halves of a record differ by, half of which their mean, the record, is off by if what makes them differ is chance, and
+more than which if it dies out.
+
+Flanks that part make a motion hang on where it came from. Two runs are then two samples rather than a good and a less
+good one of the same motion, and other motions may exist beside it, of which the record says that it does not know.
 
 Each signal, as the force of a mesh, of a bearing or a sensor's, is judged by its own largest line.
 """
@@ -11,13 +15,14 @@ Each signal, as the force of a mesh, of a bearing or a sensor's, is judged by it
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.studies.run.accuracy import APART, ATTEMPTS, COARSER, FEWEST_SLICES, FLOOR, SHARE, per_cent
+from gearmbs.studies.run.accuracy import FEWEST_SLICES, FLOOR, per_cent
 from gearmbs.studies.run.periodic import LEAST_LEVEL
+from gearmbs.studies.run.refined import COARSER, Made, refined
 from gearmbs.wording import warn
 
 if TYPE_CHECKING:
@@ -30,7 +35,19 @@ USUAL = 1e-2
 """Accuracy for which the usual tolerance does: of random trains and sets errors of steps were a fifth of it in the
 median there. What is asked below takes a smaller one in proportion."""
 
-Run = TypeVar("Run")
+SHARE = 0.3
+"""Part of the difference from the twin that is taken as the error of steps, the largest of the harmonics of a mesh: see
+docs/theory/periodic.md for the random sets and trains over which it was measured."""
+
+APART = 5e-2
+"""Difference, as a part of the largest line of the signal, beyond which the whole of it is the error."""
+
+PARTED = 1.5
+"""Of the difference, where flanks part in the record: of two samples of one distribution the second is that far off the
+first in two of three. Over random sets 98 % of levels were within it."""
+
+OTHERWISE = 0.05
+"""Part of the time by which flanks are apart more in one run than in its twin if they are of different motions."""
 
 
 @dataclass(frozen=True)
@@ -41,15 +58,24 @@ class Lines:
     ----------
     record : Dataset
         With the levels in it.
+    names : list of str
+        Of the signals.
     levels : ndarray, shape (signals, meshes, harmonics)
         RMS; NaN where a speed is not steady.
     halves : ndarray, shape (2, signals, meshes, harmonics)
         Those of the two halves of the record.
+    apart : float
+        Part of the time of the first half in which the flanks of a mesh were apart, largest of those that carry.
+    apart_before : float
+        The same over all of the run behind the run-up, as far as it is known.
     """
 
     record: xr.Dataset
+    names: list[str]
     levels: np.ndarray
     halves: np.ndarray
+    apart: float = 0.0
+    apart_before: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -61,15 +87,18 @@ class Precise:
     tolerance : float
     slices : dict of str to int
         Of the face, by mesh; those with one slice are not in it.
+    half : bool
+        Whether the run ends in the middle of the record, as that of a twin does.
     """
 
     tolerance: float
     slices: Mapping[str, int]
+    half: bool = False
 
     def coarser(self) -> Precise:
         """Return that of the twin."""
         halved = {name: max(FEWEST_SLICES - 1, n // 2) for name, n in self.slices.items()}
-        return Precise(min(COARSER * self.tolerance, LARGEST_TOLERANCE), halved)
+        return Precise(min(COARSER * self.tolerance, LARGEST_TOLERANCE), halved, half=True)
 
     def finer(self, part: float) -> Precise:
         """Return that of the next run, whose errors have to be a part of these."""
@@ -80,6 +109,33 @@ class Precise:
         counts = sorted(set(self.slices.values()))
         sliced = f" and {' and '.join(map(str, counts))} slices of the faces" if counts else ""
         return f"{self.tolerance:.2g}{sliced}"
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Numerical errors of levels.
+
+    Attributes
+    ----------
+    whole, drift : ndarray, shape (signals, meshes, harmonics)
+        The errors, and the part that the record's length has.
+    largest : ndarray, shape (signals, 1, 1)
+        What those of each signal are judged by.
+    """
+
+    whole: np.ndarray
+    drift: np.ndarray
+    largest: np.ndarray
+
+    @property
+    def worst(self) -> float:
+        """Largest error as a part."""
+        return _part(self.whole, self.largest)
+
+    @property
+    def mendable(self) -> float:
+        """The same of what finer runs mend."""
+        return _part(np.sqrt(np.maximum(self.whole**2 - self.drift**2, 0.0)), self.largest)
 
 
 def accurate_lines(
@@ -110,59 +166,98 @@ def accurate_lines(
     Returns
     -------
     Dataset
-        With ``<level>_error``, and attributes ``accuracy_asked``, ``accuracy_found`` and ``accuracy_by``.
+        With ``<level>_error``, and attributes ``accuracy_asked``, ``accuracy_found``, ``accuracy_by`` and
+        ``record_apart``, the part of the time in which flanks were apart.
+
+    Warns
+    -----
+    UserWarning
+        If the accuracy was not reached, or flanks came apart, so that other motions may exist.
     """
-    fine = Precise(max(LEAST_TOLERANCE, first.tolerance * min(1.0, wanted / USUAL)), first.slices)
-    found, coarse = run(fine), fine.coarser()
-    twin = run(coarse)
-    for attempt in range(ATTEMPTS):
-        error, largest, drift = errors_of(found, twin, groups, _share(fine, coarse))
-        worst = _part(error, largest)
-        by_steps = _part(np.sqrt(np.maximum(error**2 - drift**2, 0.0)), largest)
-        # a finer run does not mend what hangs on the length of the record
-        if worst <= wanted or by_steps <= 0.5 * wanted or attempt == ATTEMPTS - 1 or fine.tolerance <= LEAST_TOLERANCE:
-            break
-        coarse, twin = fine, found
-        fine = fine.finer(0.5 * wanted / by_steps)
-        found = run(fine)
+    first = replace(first, tolerance=max(LEAST_TOLERANCE, first.tolerance * min(1.0, wanted / USUAL)))
+    done = refined(
+        first,
+        run,
+        lambda fine, before: before or Made(coarse := fine.settings.coarser(), run(coarse)),
+        lambda fine, twin: errors_of(fine.result, twin.result, groups, _share(fine.settings, twin.settings)),
+        Precise.finer,
+        wanted,
+        LEAST_TOLERANCE,
+    )
+    found, twin, errors = done.fine.result, done.twin.result, done.judged
     record, values = found.record, found.record[level]
-    record[f"{level}_error"] = values.copy(data=error.reshape(values.shape))
+    record[f"{level}_error"] = values.copy(data=errors.whole.reshape(values.shape))
     record[f"{level}_error"].attrs = {"long_name": f"numerical error of the {values.attrs.get('long_name', level)}"}
+    worst = errors.worst
     said = (
         f"mesh harmonics are known to {per_cent(worst)} of the largest of their signal, by runs at tolerances of "
-        f"{fine}, and of {coarse}"
+        f"{done.fine.settings}, and of {done.twin.settings}"
     )
     if worst > wanted:
         said += f"; {per_cent(wanted)} was asked for"
-        if (of_length := _part(drift, largest)) > 0.5 * worst:
+        if (of_length := _part(errors.drift, errors.largest)) > 0.5 * worst:
             said += (
                 f", but the two halves of the record differ by {per_cent(2.0 * of_length)}: a longer settling or "
                 "duration lets more die out, or averages more of it"
             )
+        said += _nothing(found, errors)
+    apart = max(found.apart, found.apart_before)
+    if apart > 0.0:
+        said += _other_motions(found, twin, apart, done.fine.settings.tolerance)
+    if worst > wanted or apart > 0.0:
         warn(f"{name}: {said}")
-    record.attrs |= {"accuracy_asked": wanted, "accuracy_found": worst, "accuracy_by": said}
+    record.attrs |= {"accuracy_asked": wanted, "accuracy_found": worst, "accuracy_by": said, "record_apart": apart}
     return record
 
 
-def errors_of(found: Lines, twin: Lines, groups: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the numerical errors of levels, what they are judged by, and the part that the record's length has.
+def _nothing(found: Lines, errors: Errors) -> str:
+    """Return what is said of signals whose lines are all below their errors."""
+    most = np.nanmax(np.where(np.isfinite(found.levels), found.levels, 0.0), axis=(1, 2))
+    least = np.nanmax(np.where(np.isfinite(errors.whole), errors.whole, 0.0), axis=(1, 2))
+    lost = [k for k in range(most.size) if least[k] > most[k]]
+    if not lost:
+        return ""
+    worst = max(lost, key=lambda k: least[k] / max(most[k], np.finfo(float).tiny))
+    more = f" and {len(lost) - 1} other signals" if len(lost) > 1 else ""
+    return (
+        f"; of {found.names[worst]}{more} no line is told from nothing: {most[worst]:.2g} at most, of which the error "
+        f"is {least[worst]:.2g}, as where there is no load"
+    )
 
-    All of shape (signals, meshes, harmonics), but the second, which is (signals, 1, 1).
-    """
+
+def _other_motions(found: Lines, twin: Lines, apart: float, tolerance: float) -> str:
+    """Return what is said of a motion whose flanks come apart."""
+    both = ""
+    if abs(found.apart - twin.apart) > OTHERWISE:
+        both = (
+            f", in {per_cent(found.apart)} of the first half of the record and in {per_cent(twin.apart)} of it in the "
+            "coarser run, which is another motion"
+        )
+    return (
+        f"; flanks were apart in {per_cent(apart)} of the time behind the run-up{both}: other motions may "
+        f"exist beside this one, of which this is no error; compare a tolerance of "
+        f"{0.01 * tolerance:.1g}, or another settling"
+    )
+
+
+def errors_of(found: Lines, twin: Lines, groups: np.ndarray, share: float) -> Errors:
+    """Return the numerical errors of levels from those of the twin, whose first half of the record is looked at."""
     levels = found.levels
     largest = np.nanmax(np.where(np.isfinite(levels), levels, 0.0), axis=(1, 2), keepdims=True)
     for group in np.unique(groups):
         of = groups == group
         largest[of] = np.maximum(largest[of], LEAST_LEVEL * largest[of].max())
     # single harmonics of the two may agree by chance: the largest difference among those of a mesh counts
-    apart = np.abs(levels - twin.levels)
+    apart = np.abs(found.halves[0] - twin.halves[0])
     apart = np.max(np.where(np.isfinite(apart), apart, 0.0), axis=2, keepdims=True)
     error = np.where(apart > APART * largest, 1.0, share) * apart
+    if max(found.apart, twin.apart) > 0.0:
+        error = PARTED * apart
     error = np.maximum(error, FLOOR * largest)
     halves = np.abs(found.halves[1] - found.halves[0])
     drift = 0.5 * np.max(np.where(np.isfinite(halves), halves, 0.0), axis=2, keepdims=True)
     whole = np.where(np.isfinite(levels), np.hypot(error, drift), np.nan)
-    return whole, largest, np.broadcast_to(drift, levels.shape)
+    return Errors(whole, np.broadcast_to(drift, levels.shape), largest)
 
 
 def _share(fine: Precise, coarse: Precise) -> float:
@@ -178,7 +273,18 @@ def _part(error: np.ndarray, largest: np.ndarray) -> float:
     return float(np.nanmax(parts, initial=0.0))
 
 
-def settled_halves(evaluate: Callable[[float, float], Any], settling: float, duration: float) -> tuple[Any, Any]:
-    """Return what is evaluated of the two halves of a record, from its settling and duration, s."""
-    half = 0.5 * duration
-    return evaluate(settling, half), evaluate(settling + half, half)
+def time_apart(t: np.ndarray, forces: np.ndarray) -> float:
+    """Return the part of a time in which a mesh carries nothing, the largest of those that ever do.
+
+    Parameters
+    ----------
+    t : ndarray, shape (m,)
+        s.
+    forces : ndarray, shape (m, meshes)
+        Of the teeth, N: zero where flanks are apart.
+    """
+    loaded = forces[1:, (forces > 0.0).any(axis=0)] == 0.0
+    if not loaded.size:
+        return 0.0
+    steps = np.diff(t)
+    return float(((steps @ loaded) / steps.sum()).max())

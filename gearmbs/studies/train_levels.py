@@ -33,16 +33,19 @@ def bearing_names(train: Drivetrain) -> list[str]:
     return [*(bearing.name for bearing in train.bearings), *train.pins]
 
 
+def signal_names(train: Drivetrain) -> list[str]:
+    """Return the names of all that mesh harmonics are told of."""
+    names = [f"force of {m.name}" for m in train.meshings]
+    names += [f"{bearing} {axis}" for bearing in bearing_names(train) for axis in "xyz"]
+    return [*names, *(s.name for s in train.sensors)]
+
+
 def signals_of(train: Drivetrain, record: xr.Dataset) -> tuple[list[str], np.ndarray]:
     """Return names and values, shape (m, signals), of all that mesh harmonics are told of."""
-    names = [f"force of {m.name}" for m in train.meshings]
-    columns = [record["normal_force"].values]
-    for k, bearing in enumerate(bearing_names(train)):
-        names += [f"{bearing} {axis}" for axis in "xyz"]
-        columns.append(record["bearing_force"].values[:, k])
-    names += [s.name for s in train.sensors]
-    columns.append(record["measured"].values)
-    return names, np.concatenate(columns, axis=1)
+    bearings = [record["bearing_force"].values[:, k] for k in range(len(bearing_names(train)))]
+    return signal_names(train), np.concatenate(
+        [record["normal_force"].values, *bearings, record["measured"].values], axis=1
+    )
 
 
 def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: TrainColumns) -> xr.DataArray:

@@ -32,9 +32,9 @@ from gearmbs.studies.presets.files import FOLDER, PRESETS
 from gearmbs.studies.run.accuracy import asked_accuracy
 from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
-from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines, settled_halves
+from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines, time_apart
 from gearmbs.studies.train_bearings import bearing_remarks
-from gearmbs.studies.train_levels import bearing_names, harmonic_levels, mesh_tracks
+from gearmbs.studies.train_levels import bearing_names, harmonic_levels, mesh_tracks, signal_names
 from gearmbs.studies.train_record import (
     CONTACT,
     TrainColumns,
@@ -177,14 +177,22 @@ def _accurate(
         for name, count in precise.slices.items():
             if count != slices[name]:
                 one = one.changed(name, settings={"slices": count})
-        settings = replace(run, tolerance=precise.tolerance)
+        duration = 0.5 * run.duration if precise.half else run.duration
+        settings = replace(run, tolerance=precise.tolerance, duration=duration)
         known, solution = _simulated(one, settings, mechanism, progress)
         record = evaluated(one, settings, known, solution)
-        halves = settled_halves(
-            lambda settling, duration: _levels(one, replace(settings, settling=settling, duration=duration), known),
-            run.settling, run.duration,
-        )  # fmt: skip
-        return Lines(record, record["mesh_rms"].values, np.stack(halves))
+        levels, half = record["mesh_rms"].values, 0.5 * run.duration
+        parts = [levels]
+        if not precise.half:
+            halves = (replace(settings, settling=run.settling + k * half, duration=half) for k in range(2))
+            parts = [_levels(one, part, known) for part in halves]
+        start = one.run_up + run.settling
+        apart = [
+            time_apart(known.t[inside], known.contact[inside, :, 0])
+            for stop in (half, duration)
+            for inside in [slice(*np.searchsorted(known.t, (start, start + stop)))]
+        ]
+        return Lines(record, signal_names(one), levels, np.stack(parts), *apart)
 
     names = len(train.meshings) + 3 * (len(train.bearings) + len(train.pins))
     groups = np.concatenate([np.zeros(names, dtype=int), 1 + np.arange(len(train.sensors))])

@@ -2,8 +2,8 @@
 
 A run has three numerical errors: of its steps, which the tolerance bounds; of its length, where the motion has not yet
 come back to itself; of the sum over slices that stands for the integral along the face. Each run has a *twin* over the
-same stretch of the motion, whose tolerance is `COARSER` times as large and which has half as many slices of the face.
-What the two differ by is mostly the error of the twin. That of the run itself is smaller, by
+same stretch of the motion, whose tolerance is a decade larger (`gearmbs.studies.run.refined`) and which has half as
+many slices of the face. What the two differ by is mostly the error of the twin. That of the run itself is smaller, by
 
     tolerance   ten times with a method of order one in the tolerance; the harmonics of meshing wheels, whose steps are
                 cut by kinks, were found to follow its power of 0.6 to 1: four times at least
@@ -30,6 +30,7 @@ from gearmbs.studies.case.sections import LEAST_TOLERANCE
 from gearmbs.studies.run.levels import LEVELS
 from gearmbs.studies.run.periodic import HOLDS, LEAST_LEVEL, Found, Precision
 from gearmbs.studies.run.record import SERIES, VARIABLES
+from gearmbs.studies.run.refined import COARSER, Made, refined
 from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
 
     from gearmbs.mechanism import Mechanism
     from gearmbs.studies.case.keywords import ContactKeywords
-
-COARSER = 10.0
-"""Tolerance of the twin over that of the run: a decade. The twin costs 0.7 of the run, with half the slices 0.65."""
 
 SHARE = 0.5
 """Part of the difference from the twin that is taken as the error; see the module's text."""
@@ -66,9 +64,6 @@ SMALLEST = 2.0 * FLOOR
 FEWEST_SLICES = 3
 """Slices of a face along which flanks vary that can be judged: the twin has two of them at least."""
 
-ATTEMPTS = 3
-"""Runs at most, each at a tolerance of a tenth or less of the one before, which is its twin."""
-
 NOTED = 0.3
 """Part of the asked accuracy that a motion may miss to be said to repeat itself, if that is less than usual."""
 
@@ -78,6 +73,18 @@ class Recorded(NamedTuple):
 
     record: xr.Dataset
     found: Found | None
+
+
+class _Judged(NamedTuple):
+    """Numerical errors of levels, the part of a difference that they are at least, and the largest as a part."""
+
+    error: xr.DataArray
+    share: float
+    worst: float
+
+    @property
+    def mendable(self) -> float:
+        return self.worst
 
 
 class Run(Protocol):
@@ -174,23 +181,34 @@ def accurate_record(
     both = kept - {"acceleration"} | {level}
     precision = Precision(min(HOLDS, NOTED * wanted))
     usual = min(case.tolerance, INTEGRATORS[case.solver.integrator].largest_tolerance / COARSER)
-    fine = _at(case, max(LEAST_TOLERANCE, usual * min(1.0, wanted / USUAL[case.is_auto])), slices)
-    found = run(fine, kept | {level}, precision)
-    coarse, twin = _twin(run, fine, found, both)
-    for attempt in range(ATTEMPTS):
-        record = found.record
-        share = _share(fine, coarse)
-        error = _errors(record, twin, level, share)
-        worst = _worst(record[level], error)
-        if worst <= wanted or attempt == ATTEMPTS - 1 or fine.tolerance <= LEAST_TOLERANCE:
-            break
-        tighter = fine.tolerance * float(np.clip(0.5 * wanted / worst, 1e-3, 1.0 / COARSER))
-        last = fine, record
-        slices = slices if slices == 1 or given else 2 * slices - 1
-        fine = _at(case, max(LEAST_TOLERANCE, tighter), slices)
-        found = run(fine, kept | {level}, precision)
+    first = _at(case, max(LEAST_TOLERANCE, usual * min(1.0, wanted / USUAL[case.is_auto])), slices)
+
+    def twin_of(fine: Made[Case, Recorded], before: Made[Case, Recorded] | None) -> Made[Case, Recorded]:
         # the run before is a twin only if it has fewer slices, too
-        coarse, twin = _twin(run, fine, found, both) if given and slices > 1 else last
+        if before is not None and not (given and slices > 1):
+            return before
+        return _twin(run, fine.settings, fine.result, both)
+
+    def judge(fine: Made[Case, Recorded], twin: Made[Case, Recorded]) -> _Judged:
+        share = _share(fine.settings, twin.settings)
+        error = _errors(fine.result.record, twin.result.record, level, share)
+        return _Judged(error, share, _worst(fine.result.record[level], error))
+
+    def finer(fine: Case, part: float) -> Case:
+        count = fine.pair().face_slices
+        more = count if count == 1 or given else 2 * count - 1
+        return _at(case, max(LEAST_TOLERANCE, fine.tolerance * part), more)
+
+    done = refined(
+        first, lambda one: run(one, kept | {level}, precision), twin_of, judge, finer, wanted, LEAST_TOLERANCE
+    )
+    record, twin, fine, coarse = (
+        done.fine.result.record,
+        done.twin.result.record,
+        done.fine.settings,
+        done.twin.settings,
+    )
+    error, share, worst = done.judged.error, done.judged.share, done.judged.worst
     if level in kept:
         record[f"{level}_error"] = error
     for name in kept & {*SERIES} & {*record.data_vars} & {*twin.data_vars}:
@@ -211,12 +229,12 @@ def _slices_of(mechanism: Mechanism | None) -> int:
     return max((getattr(getattr(one, "pair", None), "face_slices", 1) for one in elements), default=1)
 
 
-def _twin(run: Run, fine: Case, found: Recorded, variables: Collection[str]) -> tuple[Case, xr.Dataset]:
+def _twin(run: Run, fine: Case, found: Recorded, variables: Collection[str]) -> Made[Case, Recorded]:
     """Return a coarser case and its record over the same stretch of the motion."""
     slices = fine.pair().face_slices
     largest = INTEGRATORS[fine.solver.integrator].largest_tolerance
     coarse = _at(fine, min(COARSER * fine.tolerance, largest), max(FEWEST_SLICES - 1, slices // 2) if slices > 1 else 1)
-    return coarse, run(coarse, variables, Precision(like=found.found)).record
+    return Made(coarse, run(coarse, variables, Precision(like=found.found)))
 
 
 def _share(fine: Case, coarse: Case) -> float:
@@ -296,4 +314,4 @@ def _told(record: xr.Dataset, wanted: float, worst: float, fine: Case, coarse: C
 
 
 def per_cent(part: float) -> str:
-    return f"{100.0 * part:.2g} %"
+    return f"{float(f'{100.0 * part:.2g}'):g} %"
