@@ -245,6 +245,11 @@ class Orbit:
         """Whether small disturbances die out."""
         return abs(self.largest) < 1.0
 
+    @property
+    def decay(self) -> float:
+        """Size of the largest multiplier by the matrix by which it was found, 0 where there is none."""
+        return float(np.abs(_by_size(self.near)[:1]).max(initial=0.0))
+
 
 def monodromy_of(problem: DAEProblem, result: DAEResult, directions: Directions, jumps: bool = True) -> np.ndarray:
     """Return how independent unknowns at the end of a run change with those at its start, shape (m, m).
@@ -291,6 +296,9 @@ LEAST_STEPS = 64
 REACHED = 0.1
 """Distance of a motion from an orbit, as part of the orbit's size, from which what its multipliers say of a small one
 holds: it then decays, if the orbit is stable."""
+CLEARLY = 0.9
+"""Multiplier below which an orbit is stable, though it is that of a motion beside it, a Newton step away: the two were
+less than 1 % apart."""
 DOUBLINGS = 2
 """How often a period is doubled where an orbit has given its stability to one of twice the period."""
 
@@ -349,12 +357,21 @@ def attracting_orbit(
     most: int = 200,
     closed: float = CLOSED,
     method: str = "WSTIFF",
+    continuous: bool = False,
 ) -> Orbit:
     """Find the stable orbit that the motion from some initial values goes to; see `find_orbit`.
 
     Where several motions exist beside each other, as about a resonance, Newton's method may lead to another one than
     the motion itself. So it is followed on until it is near the orbit. An orbit that has become unstable by a
     multiplier below -1 has given its stability to one of twice the period, which is then looked for.
+
+    Parameters
+    ----------
+    problem, period, advance, tol, settle, most, closed, method
+        As of `find_orbit`.
+    continuous : bool
+        Whether the equations are known to have no jumps. The matrix that closed an orbit then says whether it is
+        stable, if clearly, and its own is not made before it is asked for.
 
     Raises
     ------
@@ -365,6 +382,9 @@ def attracting_orbit(
     search.follow(settle)
     for doubling in range(DOUBLINGS + 1):
         orbit = search.found()
+        if continuous and orbit.decay < CLEARLY:
+            search.approach(orbit)
+            return replace(orbit, periods=search.periods)
         first = orbit.largest
         if abs(first) < 1.0:
             search.approach(orbit)

@@ -71,6 +71,28 @@ def test_the_record_of_a_steady_motion_is_that_of_a_record_that_repeats_itself()
     assert motion.record.attrs["orbit_multiplier"] < 1.0
 
 
+@pytest.mark.slow
+def test_forces_without_jumps_are_not_looked_through_before_multipliers_are_asked_for(monkeypatch):
+    from gearmbs.dae import orbits
+
+    looked, follow = [], orbits.follow
+
+    def counted(problem, end, starts, longest, jumps):
+        looked.append(jumps)
+        return follow(problem, end, starts, longest, jumps)
+
+    monkeypatch.setattr(orbits, "follow", counted)
+    motion = gm.steady(Case(operation={"speed": "3000 rpm", "torque": 20.0}), variables=["gmf_rms"])
+    assert looked == [False]
+    told = motion.record.attrs["orbit_multiplier"]
+    assert told == pytest.approx(abs(motion.multipliers[0]), rel=0.02)
+    assert looked == [False, True]
+    # teeth with faults may have corners at which forces jump
+    broken = Case(operation={"speed": "1000 rpm", "torque": 20.0}, fault={"teeth": "broken tooth"})
+    gm.steady(broken, variables=["gmf_rms"])
+    assert looked[2:].count(True) == 1
+
+
 @pytest.mark.parametrize("rpm", [650, 700, 1200, 1375, 1600])
 def test_whole_records_are_made_at_any_speed(rpm):
     case = Case(operation={"speed": f"{rpm} rpm", "torque": "100 N m"})

@@ -20,6 +20,7 @@ as much at q^h = 0.6.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -133,6 +134,10 @@ class PeriodicRecorder:
     def take(self, part: Solution) -> None:
         """Take the next steps of a run."""
         self.recorder.take(part)
+
+    def repeat(self, period: Solution, copies: Sequence[tuple[np.ndarray, float]]) -> None:
+        """Take a period of a motion that is known to repeat itself; see `Recorder.repeat`."""
+        self.recorder.repeat(period, copies)
 
     def pause(self, t: float) -> float | None:
         """Return when to look at the motion again, or None if it repeats itself; see `gearmbs.dae.Options`."""

@@ -273,6 +273,21 @@ class Recorder:
         if anew.size < wanted.size:
             self._add(some_of(part, wanted[anew.size :] - before), self._turned)
 
+    def repeat(self, period: Solution, copies: Sequence[tuple[np.ndarray, float]]) -> None:
+        """Take steps of a motion that repeats itself more than once, which are evaluated once.
+
+        Parameters
+        ----------
+        period : Solution
+            A period of it.
+        copies : sequence of (ndarray, float)
+            Which of its steps are taken, and how much later than they were, s.
+        """
+        self._model, self._turned = period, _Turned(self.case)
+        columns = np.concatenate([_taken(part, self._turned) for part in period.parts()])
+        self.slipped = slip(self.case, period.t, columns[:, FORCES])
+        self._parts += [(period.t[rows] + later, columns[rows]) for rows, later in copies]
+
     def _add(self, part: Solution, turned: _Turned) -> None:
         """Keep what is recorded of a part of a solution."""
         t, columns = part.t.copy(), _taken(part, turned)

@@ -57,7 +57,7 @@ class SteadyCase(SteadyMotion):
     ----------
     record : Dataset
         As `run_case` returns it of a motion that repeats itself; with ``orbit_multiplier``, the size of the largest
-        multiplier, in its attributes.
+        multiplier, in its attributes: by the matrix that closed the orbit, whose own is made for ``multipliers``.
     """
 
     record: xr.Dataset
@@ -142,26 +142,21 @@ def steady_case(case: Case, *, variables: Collection[str] | None = None, most: i
     NoOrbit
         See `steady`.
     """
-    return found_case(case, variables=variables, most=most)[0]
-
-
-def found_case(case: Case, *, variables: Collection[str] | None, most: int) -> tuple[SteadyCase, np.ndarray]:
-    """Return the steady motion of a case, and by what each unknown advances in a period of its wheels."""
     check_variables(variables)
     case, posed, at, tol = posed_case(case)
     meshes = geometric_period(case)
     settle = 2 if meshes == 1 else 0
     orbit = attracting_orbit(
         at.problem, at.period, at.advance, tol=tol, settle=settle, most=max(3, math.ceil(most / meshes)) + settle,
-        closed=CLOSED, method=case.solver.integrator,
+        closed=CLOSED, method=case.solver.integrator, continuous=meshes == 1,
     )  # fmt: skip
     solution = posed.solution(orbit)
     found = round(orbit.period * case.mesh_frequency)
-    recorder = period_recorder(case, solution, found, at.advance * (found // meshes), orbit.error)
+    recorder = period_recorder(case, solution, found, orbit.error)
     dataset = evaluated_period(case, solution, recorder, variables)
     dataset.attrs |= recorder.attributes()
-    dataset.attrs["orbit_multiplier"] = abs(orbit.largest)
-    return SteadyCase(solution, orbit, posed.state(orbit), dataset), at.advance
+    dataset.attrs["orbit_multiplier"] = orbit.decay
+    return SteadyCase(solution, orbit, posed.state(orbit), dataset)
 
 
 def posed_case(case: Case) -> tuple[Case, Posed, AtValue, float]:
@@ -302,18 +297,15 @@ def _balanced(moment: Any, most: float) -> float:
     raise NoOrbit("the teeth do not carry the load at any angle within half a pitch; run_case tells what happens")
 
 
-def period_recorder(case: Case, solution: Solution, meshes: int, advance: np.ndarray, error: float) -> PeriodicRecorder:
+def period_recorder(case: Case, solution: Solution, meshes: int, error: float) -> PeriodicRecorder:
     """Return what the record of a period is made from: what lies ahead of it and behind it are repetitions."""
     # it begins and ends between steps: times of copies of one step differ in their last digits
     recorder = PeriodicRecorder(case, begin=float(solution.t[:2].mean()))
-    t, y = solution.t, solution.result.y
-    length = meshes / case.mesh_frequency
+    t, length = solution.t, meshes / case.mesh_frequency
     # teeth stand as before after whole periods alone
     ahead = t >= t[-1] - AROUND * length / meshes if meshes > AROUND else t >= t[0]
     behind = t <= t[0] + length / meshes
-    times = np.concatenate([t[ahead][:-1], t[:-1] + length, t[behind] + 2.0 * length])
-    states = np.concatenate([y[ahead][:-1], y[:-1] + advance, y[behind] + 2.0 * advance])
-    for part in solution.over(times, states, solution.result.epochs).parts():
-        recorder.take(part)
+    ahead[-1] = False
+    recorder.repeat(solution, [(ahead, 0.0), (np.arange(t.size - 1), length), (behind, 2.0 * length)])
     recorder.found, recorder.deviation = Found(meshes, meshes), error
     return recorder

@@ -20,10 +20,9 @@ from gearmbs.mechanism.solve.sensitivities import values_and_scales
 from gearmbs.mechanism.solve.simulate import prepared
 from gearmbs.signals.conversion import COMPONENTS
 from gearmbs.studies.case.case import Case
-from gearmbs.studies.case.limits import geometric_period
 from gearmbs.studies.run.levels import WAYS
 from gearmbs.studies.run.simulation import SimulationFailed, case_mechanism
-from gearmbs.studies.run.steady import SteadyCase, found_case, period_recorder, posed_case
+from gearmbs.studies.run.steady import SteadyCase, period_recorder, posed_case, steady_case
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +40,6 @@ class SteadyLevels:
     motion: SteadyCase
     values: np.ndarray
     _case: Case = field(repr=False)
-    _advance: np.ndarray = field(repr=False)
 
     def levels(self, way: str) -> dict[tuple[str, int], float]:
         """Return the levels of one way, "band" or "orders", by component and harmonic."""
@@ -120,7 +118,7 @@ class SteadyLevels:
 
     def _levels_of(self, case: Case, solution: Solution) -> np.ndarray:
         meshes = round(self.motion.period * case.mesh_frequency)
-        return period_recorder(case, solution, meshes, self._advance, 0.0).levels()
+        return period_recorder(case, solution, meshes, 0.0).levels()
 
 
 def levels_or_reason(case: Case) -> SteadyLevels | str:
@@ -145,9 +143,7 @@ def steady_levels(case: Case, most: int = 200) -> SteadyLevels:
     NoOrbit, CaseError
         See `gearmbs.studies.steady`.
     """
-    motion, advance = found_case(case, variables=["gmf_rms"], most=most)
+    motion = steady_case(case, variables=["gmf_rms"], most=most)
     levels = motion.record["gmf_rms"].transpose("way", "harmonic", "component")
     levels = levels.sel(way=list(WAYS), component=list(COMPONENTS))
-    case = case.changed(operation={"duration": "auto"})
-    meshes = round(motion.period * case.mesh_frequency)
-    return SteadyLevels(motion, levels.values, case, advance * (meshes // geometric_period(case)))
+    return SteadyLevels(motion, levels.values, case.changed(operation={"duration": "auto"}))
