@@ -15,7 +15,7 @@ Each signal, as the force of a mesh, of a bearing or a sensor's, is judged by it
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,7 @@ import numpy as np
 from gearmbs.studies.run.accuracy import FEWEST_SLICES, FLOOR, per_cent
 from gearmbs.studies.run.periodic import LEAST_LEVEL
 from gearmbs.studies.run.refined import COARSER, Made, refined
+from gearmbs.studies.train_bearings import LIFE_LOAD_ERROR
 from gearmbs.wording import warn
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ class Lines:
         Part of the time of the first half in which the flanks of a mesh were apart, largest of those that carry.
     apart_before : float
         The same over all of the run behind the run-up, as far as it is known.
+    loads : ndarray, shape (2, bearings)
+        Equivalent loads of the two halves; of a twin those of the first alone.
     """
 
     record: xr.Dataset
@@ -76,6 +79,7 @@ class Lines:
     halves: np.ndarray
     apart: float = 0.0
     apart_before: float = 0.0
+    loads: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 @dataclass(frozen=True)
@@ -166,8 +170,8 @@ def accurate_lines(
     Returns
     -------
     Dataset
-        With ``<level>_error``, and attributes ``accuracy_asked``, ``accuracy_found``, ``accuracy_by`` and
-        ``record_apart``, the part of the time in which flanks were apart.
+        With ``<level>_error``, of bearings in which parts roll ``life_load_error``, and attributes ``accuracy_asked``,
+        ``accuracy_found``, ``accuracy_by`` and ``record_apart``, the part of the time in which flanks were apart.
 
     Warns
     -----
@@ -188,6 +192,10 @@ def accurate_lines(
     record, values = found.record, found.record[level]
     record[f"{level}_error"] = values.copy(data=errors.whole.reshape(values.shape))
     record[f"{level}_error"].attrs = {"long_name": f"numerical error of the {values.attrs.get('long_name', level)}"}
+    if np.isfinite(found.loads).any():
+        loads = errors_of_loads(found, twin, _share(done.fine.settings, done.twin.settings))
+        record[LIFE_LOAD_ERROR] = ("bearing", loads)
+        record[LIFE_LOAD_ERROR].attrs = {"units": "N", "long_name": "numerical error of the equivalent loads of lives"}
     worst = errors.worst
     said = (
         f"mesh harmonics are known to {per_cent(worst)} of the largest of their signal, by runs at tolerances of "
@@ -258,6 +266,14 @@ def errors_of(found: Lines, twin: Lines, groups: np.ndarray, share: float) -> Er
     drift = 0.5 * np.max(np.where(np.isfinite(halves), halves, 0.0), axis=2, keepdims=True)
     whole = np.where(np.isfinite(levels), np.hypot(error, drift), np.nan)
     return Errors(whole, np.broadcast_to(drift, levels.shape), largest)
+
+
+def errors_of_loads(found: Lines, twin: Lines, share: float) -> np.ndarray:
+    """Return the numerical errors of equivalent loads, shape (bearings,), as `errors_of` those of levels."""
+    apart = np.abs(found.loads[0] - twin.loads[0])
+    part = PARTED if max(found.apart, twin.apart) > 0.0 else share
+    drift = 0.5 * np.abs(found.loads[1] - found.loads[0])
+    return np.maximum(np.hypot(part * apart, drift), FLOOR * found.loads[0])
 
 
 def _share(fine: Precise, coarse: Precise) -> float:

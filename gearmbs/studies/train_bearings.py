@@ -10,8 +10,11 @@ import xarray as xr
 
 from gearmbs.bearings import Bearing, mean_load, rating_life
 from gearmbs.bearings.kinds import TILTED, BearingError
-from gearmbs.bearings.rating import paired_thrust
+from gearmbs.bearings.rating import life_exponent, paired_thrust
 from gearmbs.drivetrain import Drivetrain
+
+LIFE_LOAD_ERROR = "life_load_error"
+"""Name of the numerical errors of equivalent loads in a record that was made with an accuracy, N."""
 
 UNLOADED = 1e-3
 """Share of the force by its torque below which a mesh carries nothing: what is left is damping and rounding."""
@@ -31,6 +34,8 @@ class BearingLife(NamedTuple):
         Whose C it is: a maker, the formula of the standard, or the description of the drivetrain.
     note : str
         Why there is no life, or what else is to be known of it.
+    error : float
+        Numerical error of turns and hours, as a part of them; NaN if the record was made without an accuracy.
     """
 
     name: str
@@ -41,6 +46,7 @@ class BearingLife(NamedTuple):
     hours: float
     source: str
     note: str
+    error: float = np.nan
 
 
 class _Loaded(NamedTuple):
@@ -57,22 +63,40 @@ def bearing_lives(train: Drivetrain, record: xr.Dataset) -> list[BearingLife]:
 
     A bearing without a life, as one of cylindrical rollers with an axial load, has NaN and a note that says why.
     """
-    paired = _paired(train, record)
+    errors = record[LIFE_LOAD_ERROR] if LIFE_LOAD_ERROR in record else None
     out = []
+    for name, rolling, load, mean, note in _equivalent(train, record):
+        turns = hours = error = np.nan
+        if np.isfinite(load):
+            turns = rating_life(rolling, load) if load > 0.0 else np.inf
+            hours = turns * 2.0 * np.pi / mean / 3600.0 if mean > 0.0 else np.inf
+        if errors is not None and load > 0.0:
+            error = life_exponent(rolling) * float(errors.sel(bearing=name)) / load
+        source = _source(rolling)
+        out.append(
+            BearingLife(name, rolling.designation or "-", rolling.rating, load, turns, hours, source, note, error)
+        )
+    return out
+
+
+def equivalent_loads(train: Drivetrain, record: xr.Dataset, first: int = 0, stop: int | None = None) -> np.ndarray:
+    """Return the equivalent loads of all bearings of a record, N, NaN where none is known, from some of its samples."""
+    part = record.isel(time=slice(first, stop))
+    found = {name: load for name, _, load, _, _ in _equivalent(train, part)}
+    return np.array([found.get(str(name), np.nan) for name in record["bearing"].values])
+
+
+def _equivalent(train: Drivetrain, record: xr.Dataset) -> Iterator[tuple[str, Bearing, float, float, str]]:
+    """Yield name, bearing, equivalent load (N), mean speed of the rings (rad/s) and a note of what rolls."""
+    paired = _paired(train, record)
     for name, rolling, force, speed in _loaded(train, record):
-        note = _note(train, name, force, name in paired)
-        load = turns = hours = np.nan
+        note, load = _note(train, name, force, name in paired), np.nan
         try:
             axial = paired.get(name, force[:, 2])
             load = mean_load(rolling, np.hypot(force[:, 0], force[:, 1]), axial, speed) if speed.any() else 0.0
-            turns = rating_life(rolling, load) if load > 0.0 else np.inf
-            mean = float(speed.mean())
-            hours = turns * 2.0 * np.pi / mean / 3600.0 if mean > 0.0 else np.inf
         except BearingError as error:
             note = f"no life: {error}"
-        out.append(BearingLife(name, rolling.designation or "-", rolling.rating, load, turns, hours,
-                               _source(rolling), note))  # fmt: skip
-    return out
+        yield name, rolling, load, float(speed.mean()), note
 
 
 def _source(rolling: Bearing) -> str:

@@ -223,6 +223,10 @@ class TrainPage:
              *("-" if np.isnan(x) else f"{x:.4g}" for x in (one.load, 1e-6 * one.turns, one.hours)), one.note]
             for one in self.lives
         ]  # fmt: skip
+        if any(np.isfinite(one.error) for one in self.lives):
+            header.insert(-1, "numerical error of L10, %")
+            for row, one in zip(rows, self.lives, strict=True):
+                row.insert(-1, f"{100.0 * one.error:.2g}" if np.isfinite(one.error) else "-")
         told = markdown_table(header, rows) if rows else "No bearing says what rolls in it: give it `rolling`."
         pairs = [
             f"The one-sided bearings of shaft '{shaft.name}' stand {stand}."

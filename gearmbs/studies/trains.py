@@ -33,7 +33,7 @@ from gearmbs.studies.run.accuracy import asked_accuracy
 from gearmbs.studies.run.parallel import run_named
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
 from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines, time_apart
-from gearmbs.studies.train_bearings import bearing_remarks
+from gearmbs.studies.train_bearings import bearing_remarks, equivalent_loads
 from gearmbs.studies.train_levels import bearing_names, harmonic_levels, mesh_tracks, signal_names
 from gearmbs.studies.train_record import (
     CONTACT,
@@ -181,6 +181,8 @@ def _accurate(
         settings = replace(run, tolerance=precise.tolerance, duration=duration)
         known, solution = _simulated(one, settings, mechanism, progress)
         record = evaluated(one, settings, known, solution)
+        # the drivetrain as it was asked for: slices are those of its accuracy, and told beside it
+        record.attrs["train_json"] = _described(train)
         levels, half = record["mesh_rms"].values, 0.5 * run.duration
         parts = [levels]
         if not precise.half:
@@ -192,7 +194,10 @@ def _accurate(
             for stop in (half, duration)
             for inside in [slice(*np.searchsorted(known.t, (start, start + stop)))]
         ]
-        return Lines(record, signal_names(one), levels, np.stack(parts), *apart)
+        middle = record.sizes["time"] if precise.half else record.sizes["time"] // 2
+        loads = [equivalent_loads(one, record, 0, middle)]
+        loads += [] if precise.half else [equivalent_loads(one, record, middle)]
+        return Lines(record, signal_names(one), levels, np.stack(parts), *apart, np.stack(loads))
 
     names = len(train.meshings) + 3 * (len(train.bearings) + len(train.pins))
     groups = np.concatenate([np.zeros(names, dtype=int), 1 + np.arange(len(train.sensors))])
@@ -369,6 +374,11 @@ def _even_record(train: Drivetrain, run: RunSettings, known: TrainColumns) -> xr
     return _dataset(train, t, contact, bearing, values[:, meshes + 3 * bearings :], speed, error)
 
 
+def _described(train: Drivetrain) -> str:
+    """Return the parts of a drivetrain as JSON."""
+    return json.dumps(described({name: part for name, part in train.parts.items()}))
+
+
 def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution: Solution) -> xr.Dataset:
     """Return the record of what was measured at the integrator's own steps; see `run_train`."""
     rate = run.output_rate(train)
@@ -436,7 +446,7 @@ def attributes(train: Drivetrain, run: RunSettings | None, solution: Solution) -
     """Return what a record says of its drivetrain, settings and solver."""
     out: dict[str, Any] = {
         "title": f"drivetrain: {train.name}",
-        "train_json": json.dumps(described({name: part for name, part in train.parts.items()})),
+        "train_json": _described(train),
         "gearmbs_version": gearmbs.__version__,
     }
     if train.meshings:

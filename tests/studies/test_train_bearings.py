@@ -98,3 +98,18 @@ def test_bearings_loaded_against_their_sense_are_named():
     assert len(told) >= 1
     assert all("against its sense" in one for one in told)
     assert {one.name for one in bearing_lives(turned, record) if "shoulder" in one.note} <= {"i1", "i2"}
+
+
+def test_lives_of_a_record_with_an_accuracy_have_errors():
+    train = stage((elastic("6206"), elastic("6206")), (elastic("NU206"), elastic("6206")))
+    run = RunSettings(settling=0.03, duration=0.04)
+    record = run_train(train, run, accuracy="2 %")
+    found = lives_of(train, record)
+    exact = lives_of(train, run_train(train, RunSettings(settling=0.03, duration=0.04, tolerance=1e-10)))
+    known = {name for name, one in found.items() if np.isfinite(one.turns)}
+    assert known == {name for name, one in exact.items() if np.isfinite(one.turns)} >= {"i1", "i2", "o2"}
+    for name in known:
+        assert abs(found[name].turns / exact[name].turns - 1.0) <= found[name].error < 0.05
+    told = train_page(train, record)._life()[2]
+    assert "numerical error of L10" in told
+    assert not np.isfinite(exact["i1"].error)
