@@ -14,7 +14,7 @@ import numpy as np
 from gearmbs.dae.linalg.sparse_lu import solve
 from gearmbs.dae.problem import EPS
 from gearmbs.dae.result import lagrange_weights
-from gearmbs.dae.tangent_track import MOST
+from gearmbs.dae.tangent_track import MOST, slot_of
 from gearmbs.kernels.jit import njit
 
 SEEN = 1e-5
@@ -56,7 +56,7 @@ def _residual(functions, tr, k, t, yp, p, by, idata, rdata, work):
             v += tr.value[j] * tr.y[j, i]
         if by != 0.0:
             for j in range(k + 1):
-                v += tr.value[j] * by * tr.s[j * count + p, i]
+                v += tr.value[j] * by * tr.s[slot_of(tr, j) * count + p, i]
         tr.between[i] = v
     first, last = tr.first[p], tr.first[p + 1]
     if by != 0.0:

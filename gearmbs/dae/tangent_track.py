@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 
@@ -23,7 +24,7 @@ class Track(Struct):
     y : ndarray, shape (HISTORY, n)
         The run there, in the coordinates that are valid now.
     s : ndarray, shape (HISTORY * p, n)
-        Sensitivities there, of all parameters point after point.
+        Sensitivities there, of all parameters slot after slot: each point stays in its slot until it is the oldest.
     place, weight : ndarray
         Places in the table of numbers that parameters change, and the change by one of the parameter.
     first : ndarray of int64, shape (p + 1,)
@@ -62,6 +63,7 @@ class Track(Struct):
 
     parameters: int
     n_past: int
+    newest: int  # slot of the newest point
     seen: int  # outputs written
     has_hook: bool
     nonlinear_rates: bool
@@ -107,6 +109,13 @@ class Track(Struct):
 
 
 TRACK_TYPE = Track.numba_type
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def slot_of(tr, j):
+    """Return the slot of the j-th point of the history, the newest being 0."""
+    slot = tr.newest + j
+    return slot - HISTORY if slot >= HISTORY else slot
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -36,7 +36,7 @@ from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, factor, new
 from gearmbs.dae.problem import HISTORY_CHANGED, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, DenseOutput, lagrange_weights
 from gearmbs.dae.tangent_jumps import look_for_jumps
-from gearmbs.dae.tangent_track import TRACK_TYPE, Track, size_of_move
+from gearmbs.dae.tangent_track import TRACK_TYPE, Track, size_of_move, slot_of
 from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no_hook
@@ -93,21 +93,24 @@ def _foretell(functions, tr, k, past, p, side, y, yp, idata, rdata, work):
     """
     n, count = tr.scale.shape[0], tr.parameters
     s, slope, foretold, plus = tr.s, tr.slope, tr.rate, tr.sides[side]
+    row = slot_of(tr, 1) * count + p
     for i in range(n):
-        foretold[i] = slope[1] * s[count + p, i]
+        foretold[i] = slope[1] * s[row, i]
     for j in range(2, k + 1):
+        row = slot_of(tr, j) * count + p
         for i in range(n):
-            foretold[i] += slope[j] * s[j * count + p, i]
+            foretold[i] += slope[j] * s[row, i]
     # what the polynomial through the past says tells the error
+    new = slot_of(tr, 0) * count + p
     for i in range(n):
-        s[p, i] = 0.0
+        s[new, i] = 0.0
     for j in range(past):
-        w = tr.value[j]
+        w, row = tr.value[j], slot_of(tr, j + 1) * count + p
         for i in range(n):
-            s[p, i] += w * s[(j + 1) * count + p, i]
+            s[new, i] += w * s[row, i]
     by = BY
     if tr.nonlinear_rates:
-        by = min(BY, size_of_move(tr, s, p))
+        by = min(BY, size_of_move(tr, s, new))
     first, last = tr.first[p], tr.first[p + 1]
     for q in range(first, last):
         tr.kept[q] = rdata[tr.place[q]]
@@ -123,9 +126,9 @@ def _foretell(functions, tr, k, past, p, side, y, yp, idata, rdata, work):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
-    """Find the sensitivities at ``t`` by the order-k formula, into the row of ``s`` beyond the history.
+    """Find the sensitivities at ``t`` by the order-k formula.
 
-    The history has been moved back by one point: what is sought stands at 0.
+    The history has been moved back by one point: what is sought stands in the newest slot.
 
     Parameters
     ----------
@@ -182,11 +185,11 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
             for side in range(end - begin):
                 solve(plan, factors, tr.sides[side], tr.sides[side])
         for p in range(begin, end):
-            found = tr.sides[p - begin]
+            found, new = tr.sides[p - begin], slot_of(tr, 0) * count + p
             for i in range(n):
-                tr.error[p, i] = max(tr.error[p, i], told * abs(found[i] - s[p, i]))
-                s[p, i] = found[i]
-                tr.largest[p, i] = max(tr.largest[p, i], abs(s[p, i]))
+                tr.error[p, i] = max(tr.error[p, i], told * abs(found[i] - s[new, i]))
+                s[new, i] = found[i]
+                tr.largest[p, i] = max(tr.largest[p, i], abs(found[i]))
     return True
 
 
@@ -201,8 +204,9 @@ def _write_outputs(tr, k, outputs, s_out, sp_out):
             for i in range(n):
                 v, d = 0.0, 0.0
                 for j in range(k + 1):
-                    v += tr.value[j] * tr.s[j * count + p, i]
-                    d += tr.slope[j] * tr.s[j * count + p, i]
+                    row = slot_of(tr, j) * count + p
+                    v += tr.value[j] * tr.s[row, i]
+                    d += tr.slope[j] * tr.s[row, i]
                 s_out[m * count + p, i] = v
                 sp_out[m * count + p, i] = d
         tr.seen = m + 1
@@ -220,10 +224,11 @@ def _change_coordinates(functions, tr, t, rdata, work):
         for i in range(n):
             tr.rows[j * width, i] = tr.before[j, i]
         for p in range(count):
-            by = size_of_move(tr, tr.s, j * count + p)
+            row = slot_of(tr, j) * count + p
+            by = size_of_move(tr, tr.s, row)
             for i in range(n):
-                tr.rows[j * width + 1 + 2 * p, i] = tr.before[j, i] + by * tr.s[j * count + p, i]
-                tr.rows[j * width + 2 + 2 * p, i] = tr.before[j, i] - by * tr.s[j * count + p, i]
+                tr.rows[j * width + 1 + 2 * p, i] = tr.before[j, i] + by * tr.s[row, i]
+                tr.rows[j * width + 2 + 2 * p, i] = tr.before[j, i] - by * tr.s[row, i]
     for i in range(tr.old.shape[0]):
         tr.table[i] = tr.old[i]
     # what it counts in the table of numbers is counted already
@@ -231,14 +236,15 @@ def _change_coordinates(functions, tr, t, rdata, work):
     functions.hook(t, tr.rows, past * width, tr.table, numbers, work)
     for j in range(past):
         for p in range(count):
-            by = size_of_move(tr, tr.s, j * count + p)
+            by = size_of_move(tr, tr.s, slot_of(tr, j) * count + p)
             for i in range(n):
                 moved = tr.rows[j * width + 1 + 2 * p, i] - tr.rows[j * width + 2 + 2 * p, i]
                 tr.rows[j * width + 1 + 2 * p, i] = moved / (2.0 * by)
     for j in range(past):
         for p in range(count):
+            row = slot_of(tr, j) * count + p
             for i in range(n):
-                tr.s[j * count + p, i] = tr.rows[j * width + 1 + 2 * p, i]
+                tr.s[row, i] = tr.rows[j * width + 1 + 2 * p, i]
 
 
 @njit(
@@ -282,18 +288,14 @@ def follow_run(
             tr.times[j] = tr.times[j - 1]
             for i in range(n):
                 tr.y[j, i] = tr.y[j - 1, i]
-            for p in range(count):
-                for i in range(n):
-                    tr.s[j * count + p, i] = tr.s[(j - 1) * count + p, i]
+        tr.newest = slot_of(tr, HISTORY - 1)
         k = min(orders[m], past)
         if not _step(functions, tr, plan, factors, looked[m], k, y[m], yp[m], idata, rdata, work):
             for j in range(past):
                 tr.times[j] = tr.times[j + 1]
                 for i in range(n):
                     tr.y[j, i] = tr.y[j + 1, i]
-                for p in range(count):
-                    for i in range(n):
-                        tr.s[j * count + p, i] = tr.s[(j + 1) * count + p, i]
+            tr.newest = slot_of(tr, 1)
             return m
         tr.times[0] = times[m]
         for i in range(n):
@@ -304,7 +306,7 @@ def follow_run(
                 if tr.differential[i] == 0.0:
                     tr.y[1, i] = tr.y[0, i]
                     for p in range(count):
-                        tr.s[count + p, i] = tr.s[p, i]
+                        tr.s[slot_of(tr, 1) * count + p, i] = tr.s[slot_of(tr, 0) * count + p, i]
         if tr.jumps:
             tr.unseen += 1
             # as many steps at once as the next polynomial would not go through, and none across a restart
@@ -373,33 +375,49 @@ def points_of(sol: DenseOutput, longest: float = np.inf) -> tuple[np.ndarray, np
     """
     nodes, step_orders = sol.stored()
     steps = np.flatnonzero(step_orders > 0)
-    times: list[float] = []
-    orders: list[int] = []
-    flags: list[int] = []
-    before, last, size, allowed, growing = 0, float(nodes[steps[0] - 1]), np.inf, 1, False
-    ends_of, orders_of = nodes[steps].tolist(), step_orders[steps].tolist()
-    for end, order in zip(ends_of, orders_of, strict=True):
-        h = end - last
-        if h > EVEN * longest:
+    ends, step_orders = nodes[steps], step_orders[steps].astype(np.int64)
+    sizes = np.diff(ends, prepend=nodes[steps[0] - 1])
+    even = sizes > EVEN * longest
+    # of all other steps times and orders are those of the run, once the order has grown
+    notable = np.append(np.flatnonzero((step_orders == 1) | even), ends.size)
+    times: list[np.ndarray] = []
+    orders: list[np.ndarray] = []
+    flags: list[np.ndarray] = []
+    before, size, allowed, growing, at = 0, np.inf, 1, False, 0
+    while at < ends.size:
+        if not growing and allowed >= MAX_ORDER:
+            until = int(notable[np.searchsorted(notable, at)])
+            if until > at:
+                times.append(ends[at:until])
+                orders.append(np.minimum(step_orders[at:until], MAX_ORDER))
+                flags.append(np.full(until - at, END_OF_STEP))
+                size, before, at = float(sizes[until - 1]), int(step_orders[until - 1]), until
+                continue
+        end, h, order = float(ends[at]), float(sizes[at]), int(step_orders[at])
+        if even[at]:
             order = max(order, min(EVEN_ORDER, before + 1))
         afresh = order == 1 and (before != 1 or h < SHORTER * size)
         growing |= afresh
-        ends, last_piece = [end], h
+        inner, last_piece = np.array([end]), h
         if not afresh and growing and h > GROWTH * size:
             number = int(np.ceil(np.log1p((GROWTH - 1.0) * h / (GROWTH * size)) / np.log(GROWTH)))
             pieces = GROWTH ** np.arange(number, dtype=float)
-            ends = [*(last + h * np.cumsum(pieces) / pieces.sum())[:-1].tolist(), end]
+            inner = np.append((end - h + h * np.cumsum(pieces) / pieces.sum())[:-1], end)
             last_piece = h * float(pieces[-1] / pieces.sum())
         elif not afresh and allowed >= min(order, GROWING_ORDER):
             growing = False
         allowed = 0 if afresh else allowed
-        for q, t in enumerate(ends):
+        grown = []
+        for _ in inner:
             allowed = min(allowed + 1, GROWING_ORDER if growing else MAX_ORDER)
-            times.append(t)
-            orders.append(allowed if growing else min(allowed, order))
-            flags.append((AFRESH if afresh else 0) | (END_OF_STEP if q + 1 == len(ends) else 0))
-        size, before, last = last_piece, order, end
-    return np.array(times), np.array(orders, dtype=np.int64), np.array(flags, dtype=np.int64)
+            grown.append(allowed if growing else min(allowed, order))
+        flag = np.full(inner.size, AFRESH if afresh else 0)
+        flag[-1] |= END_OF_STEP
+        times.append(inner)
+        orders.append(np.array(grown))
+        flags.append(flag)
+        size, before, at = last_piece, order, at + 1
+    return np.concatenate(times), np.concatenate(orders).astype(np.int64), np.concatenate(flags).astype(np.int64)
 
 
 def follow(
@@ -505,6 +523,7 @@ def _track(problem: DAEProblem, directions: list[Direction], jumps: bool) -> Tra
     return Track(
         parameters=count,
         n_past=1,
+        newest=0,
         has_hook=problem.hook is not None,
         nonlinear_rates=problem.nonlinear_rates,
         jumps=jumps,

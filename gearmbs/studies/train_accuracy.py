@@ -43,9 +43,9 @@ docs/theory/periodic.md for the random sets and trains over which it was measure
 APART = 5e-2
 """Difference, as a part of the largest line of the signal, beyond which the whole of it is the error."""
 
-PARTED = 1.5
-"""Of the difference, where flanks part in the record: of two samples of one distribution the second is that far off the
-first in two of three. Over random sets 98 % of levels were within it."""
+PARTED = 2.0
+"""Of the difference, where flanks part: of two samples of one distribution the second is that far off the first in one
+of six, of the largest of three harmonics in fewer."""
 
 OTHERWISE = 0.05
 """Part of the time by which flanks are apart more in one run than in its twin if they are of different motions."""
@@ -125,11 +125,14 @@ class Errors:
         The errors, and the part that the record's length has.
     largest : ndarray, shape (signals, 1, 1)
         What those of each signal are judged by.
+    samples : ndarray of bool, shape (signals, meshes, 1)
+        Where run and twin are two samples of motions whose flanks part, which finer runs bring no nearer to each other.
     """
 
     whole: np.ndarray
     drift: np.ndarray
     largest: np.ndarray
+    samples: np.ndarray
 
     @property
     def worst(self) -> float:
@@ -139,7 +142,8 @@ class Errors:
     @property
     def mendable(self) -> float:
         """The same of what finer runs mend."""
-        return _part(np.sqrt(np.maximum(self.whole**2 - self.drift**2, 0.0)), self.largest)
+        by_steps = np.sqrt(np.maximum(self.whole**2 - self.drift**2, 0.0))
+        return _part(np.where(self.samples, 0.0, by_steps), self.largest)
 
 
 def accurate_lines(
@@ -258,20 +262,24 @@ def errors_of(found: Lines, twin: Lines, groups: np.ndarray, share: float) -> Er
     # single harmonics of the two may agree by chance: the largest difference among those of a mesh counts
     apart = np.abs(found.halves[0] - twin.halves[0])
     apart = np.max(np.where(np.isfinite(apart), apart, 0.0), axis=2, keepdims=True)
-    error = np.where(apart > APART * largest, 1.0, share) * apart
-    if max(found.apart, twin.apart) > 0.0:
-        error = PARTED * apart
+    far, parted = apart > APART * largest, _parted(found, twin)
+    error = (PARTED if parted else np.where(far, 1.0, share)) * apart
     error = np.maximum(error, FLOOR * largest)
     halves = np.abs(found.halves[1] - found.halves[0])
     drift = 0.5 * np.max(np.where(np.isfinite(halves), halves, 0.0), axis=2, keepdims=True)
     whole = np.where(np.isfinite(levels), np.hypot(error, drift), np.nan)
-    return Errors(whole, np.broadcast_to(drift, levels.shape), largest)
+    return Errors(whole, np.broadcast_to(drift, levels.shape), largest, far & parted)
+
+
+def _parted(found: Lines, twin: Lines) -> bool:
+    """Return whether flanks part in a run or its twin, so that they may be of different motions."""
+    return max(found.apart, found.apart_before, twin.apart) > 0.0
 
 
 def errors_of_loads(found: Lines, twin: Lines, share: float) -> np.ndarray:
     """Return the numerical errors of equivalent loads, shape (bearings,), as `errors_of` those of levels."""
     apart = np.abs(found.loads[0] - twin.loads[0])
-    part = PARTED if max(found.apart, twin.apart) > 0.0 else share
+    part = PARTED if _parted(found, twin) else share
     drift = 0.5 * np.abs(found.loads[1] - found.loads[0])
     return np.maximum(np.hypot(part * apart, drift), FLOOR * found.loads[0])
 

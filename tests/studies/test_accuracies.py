@@ -78,7 +78,20 @@ def test_flanks_that_part_are_told_with_both_runs_where_these_differ():
         record = accurate_lines(run, Precise(1e-7, {}), 0.01, GROUPS, "mesh_rms", "set")
     assert record.attrs["record_apart"] == 0.03
     # two samples, of which neither is the better one
-    np.testing.assert_allclose(record["mesh_rms_error"][0, 0], 0.15)
+    np.testing.assert_allclose(record["mesh_rms_error"][0, 0], 0.2)
+
+
+def test_finer_runs_are_not_tried_where_two_are_samples():
+    runs = []
+
+    def run(precise):
+        runs.append(precise.half)
+        return lines(LEVELS * (1.1 if precise.half else 1.0), apart=0.5)
+
+    with pytest.warns(UserWarning, match=says("50 %", "1 %")):
+        record = accurate_lines(run, Precise(1e-7, {}), 0.01, GROUPS, "mesh_rms", "set")
+    assert runs == [False, True]
+    assert record.attrs["accuracy_found"] == pytest.approx(0.2)
 
 
 def test_a_signal_below_its_error_is_said_to_be_nothing():
