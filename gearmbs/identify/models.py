@@ -404,7 +404,7 @@ class SignalProblem(Problem):
             If it fails without them, too.
         """
         if self._refused >= TRIED:
-            return None, self._plain(name, p, times)
+            return None, self._run_alone(name, p, times)
         self.runs += 1
         try:
             with warnings.catch_warnings():
@@ -414,12 +414,12 @@ class SignalProblem(Problem):
                 )
             return found, found.solution
         except ModelError as error:
-            solution = self._plain(name, p, times)
+            solution = self._run_alone(name, p, times)
             self._refused += 1
             self._note(f"derivatives by differences: {error}")
             return None, solution
 
-    def _plain(self, name: str, p: tuple[float, ...], times: np.ndarray) -> Solution:
+    def _run_alone(self, name: str, p: tuple[float, ...], times: np.ndarray) -> Solution:
         """Return the run of a case without derivatives, at the tolerance that they would have.
 
         Raises

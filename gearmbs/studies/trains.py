@@ -189,15 +189,15 @@ def _accurate(
             halves = (replace(settings, settling=run.settling + k * half, duration=half) for k in range(2))
             parts = [_levels(one, part, known) for part in halves]
         start = one.run_up + run.settling
-        apart = [
+        within, whole = (
             time_apart(known.t[inside], known.contact[inside, :, 0])
             for stop in (half, duration)
             for inside in [slice(*np.searchsorted(known.t, (start, start + stop)))]
-        ]
+        )
         middle = record.sizes["time"] if precise.half else record.sizes["time"] // 2
         loads = [equivalent_loads(one, record, 0, middle)]
         loads += [] if precise.half else [equivalent_loads(one, record, middle)]
-        return Lines(record, signal_names(one), levels, np.stack(parts), *apart, np.stack(loads))
+        return Lines(record, signal_names(one), levels, np.stack(parts), within, whole, np.stack(loads))
 
     names = len(train.meshings) + 3 * (len(train.bearings) + len(train.pins))
     groups = np.concatenate([np.zeros(names, dtype=int), 1 + np.arange(len(train.sensors))])
