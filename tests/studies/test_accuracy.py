@@ -9,8 +9,9 @@ from typer.testing import CliRunner
 
 from gearmbs.cli import app
 from gearmbs.studies import Case, CaseError, CaseWarning, run_case, run_cases, sweep
-from gearmbs.studies.run.accuracy import ATTEMPTS, SHARE, Recorded, accurate_record, asked_accuracy
+from gearmbs.studies.run.accuracy import SHARE, Recorded, accurate_record, asked_accuracy
 from gearmbs.studies.run.periodic import Found
+from gearmbs.studies.run.refined import ATTEMPTS
 from gearmbs.studies.run.simulation import case_mechanism
 from gearmbs.view import gmf_bars
 from tests import generators
