@@ -15,7 +15,7 @@ from gearmbs.drivetrain.part import DrivetrainError
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.mesh import FlankFriction
-from gearmbs.mechanism.parts.functions import constant
+from gearmbs.mechanism.parts.functions import as_function, constant
 from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.mechanism.solve.analyses import static_equilibrium
 from gearmbs.mechanism.solve.plant_names import Given, Told, count_from_here, own_marker
@@ -61,11 +61,17 @@ def _own_input(part: Drive | Load) -> Input | None:
     return torque if isinstance(torque, Input) else None
 
 
-def loaded(train: Drivetrain) -> tuple[Mechanism, float]:
+def loaded(train: Drivetrain, speed: float = 0.0) -> tuple[Mechanism, float]:
     """Return the mechanism of a drivetrain at rest under the torques of its operating point, and a time at which.
 
     Shafts of prescribed speed are held; other drives hold the train while it comes to rest, and then give way to the
     torque they held it with. Torques that are inputs stay inputs, at the values they have until they are set.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    speed : float
+        Of the first drive, rad/s, its sense left out: all bodies turn as they do then, in the same position.
 
     Raises
     ------
@@ -89,7 +95,36 @@ def loaded(train: Drivetrain) -> tuple[Mechanism, float]:
                 sense = math.copysign(1.0, drive.speed)
                 text = f'({torque!r}) + ({sense!r})*("{own.name}" - ({own.start!r}))'
                 m.axis_torque(drive.name, held.i, held.j, text)
+    if speed:
+        _turn(still, m, abs(speed / train.drives[0].speed), after)
     return m, after
+
+
+def _turn(train: Drivetrain, m: Mechanism, share: float, time: float) -> None:
+    """Let the bodies of a mechanism turn at a part of their operating speeds, from where they are at a time, s."""
+    for name, speed in train.speeds.items():
+        _spin(m.bodies[name], share * speed)
+    for stage in train.planetary_stages:
+        speeds = stage.speeds(train)
+        member, shaft = next(iter(stage.turning(train).items()))
+        seat = train.layout.seats[shaft]
+        middle, around = seat.at(stage.station(train, member)), share * speeds["carrier"] * seat.axes[:, 2]
+        if stage.carrier_name in m.bodies:
+            _spin(m.bodies[stage.carrier_name], share * speeds["carrier"])
+        for number in range(1, stage.gears.planets + 1):
+            planet = m.bodies[stage.planet(number)]
+            _spin(planet, share * speeds["planet"])
+            planet.velocity = np.cross(around, planet.position - middle)
+    for drive in train.drives:
+        joint = m.joints.get(drive.name)
+        if joint is not None:
+            turned = as_function(f"{share * drive.speed!r}*(TIME - {time!r})", "rad", drive.label)
+            joint.rows[:] = [replace(row, rotation=turned) for row in joint.rows]
+
+
+def _spin(body: Body, speed: float) -> None:
+    """Let a body turn about its own z axis, rad/s."""
+    body.angular_velocity = speed * body.orientation[:, 2]
 
 
 def linearize(

@@ -9,6 +9,7 @@ from .mode_names import mode_table as mode_table
 from .mode_names import named_modes as named_modes
 from .mode_names import ranked_crossings as ranked_crossings
 from .mode_names import train_modes as train_modes
+from .mode_names import whirl_senses as whirl_senses
 from .presets.bench import BenchSettings as BenchSettings
 from .presets.bench import BenchStudy as BenchStudy
 from .presets.bench import bench_choices as bench_choices

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +32,10 @@ MOTIONS = ("bending", "torsion", "stretching")
 RIGID = "rigid motion"
 
 
-def train_modes(train: Drivetrain, *, accuracy: QuantityLike | None = None, below: QuantityLike | None = None) -> Modes:
+def train_modes(
+    train: Drivetrain, *, accuracy: QuantityLike | None = None, below: QuantityLike | None = None,
+    speed: QuantityLike | None = None,
+) -> Modes:  # fmt: skip
     """Return the modes of a whole drivetrain about its position of rest under the operating torques.
 
     Tooth contacts have the stiffness of the pairs that touch there, and no friction. Shafts of prescribed speed are
@@ -45,6 +50,9 @@ def train_modes(train: Drivetrain, *, accuracy: QuantityLike | None = None, belo
         housings that deform are doubled until it is, and ``errors`` tells; see `gearmbs.studies.mode_accuracy`.
     below : float or str, optional
         Up to which frequency that is asked, Hz; default three times the highest mesh frequency.
+    speed : float or str, optional
+        Of the first drive, rad/s: all shafts turn as they do then, and bend with their gyroscopic moments, so that
+        bending modes part into whirl forwards and backwards. The teeth stand as at rest. Default: nothing turns.
 
     Returns
     -------
@@ -64,19 +72,52 @@ def train_modes(train: Drivetrain, *, accuracy: QuantityLike | None = None, belo
         Of meshes that are damped above critical: their modes do not oscillate; of an accuracy that is not reached.
     """
     warn_of_overdamped_meshes(train)
+    turning = 0.0 if speed is None else to_si(speed, "angular speed", "speed")
     if accuracy is None:
         if below is not None:
             raise DrivetrainError(
                 f"below = {below!r}: it is where an accuracy ends; give accuracy, too, or leave it out"
             )
-        return _modes(train)
+        return _modes(train, turning)
     limit = None if below is None else to_si(below, "frequency", "below")
-    return accurate_modes(_modes, train, accuracy, limit)
+    return accurate_modes(partial(_modes, speed=turning), train, accuracy, limit)
 
 
-def _modes(train: Drivetrain) -> Modes:
-    m, after = loaded(train)
-    return linear_modes(m, t=after)
+def _modes(train: Drivetrain, speed: float = 0.0) -> Modes:
+    m, after = loaded(train, speed)
+    with warnings.catch_warnings():
+        if not any(stage.speeds(train)["carrier"] for stage in train.planetary_stages):
+            # shafts are round, but off their axes by the micrometres by which their loads bend them
+            warnings.filterwarnings("ignore", message=".*coefficients of the linearised equations vary with time")
+        return linear_modes(m, t=after)
+
+
+CIRCULAR = 0.1
+"""Area of an orbit, of that of a circle as long, from which on it goes one way: an ellipse of axes 20 : 1."""
+
+
+def whirl_senses(train: Drivetrain, modes: Modes) -> list[str]:
+    """Return how shafts go round in modes at speed: "forward", as they turn, "backward", or "" where they do not.
+
+    Shafts count by how far their centres and ends move across their axes, each in the sense in which it turns.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    modes : Modes
+        At speed, as of `train_modes` with ``speed``. At rest the pairs of round shafts are of any sense.
+    """
+    area, size = np.zeros(len(modes)), np.zeros(len(modes))
+    for shaft in train.shafts:
+        moved = modes.shapes[:, modes.body_names.index(shaft.name)]
+        axes, sense = train.layout.seats[shaft.name].axes, np.sign(train.speeds[shaft.name])
+        for part in (moved[:, :3], 0.5 * shaft.length * moved[:, 3:]):
+            x, y = (part @ axes)[:, :2].T
+            area += sense * 2.0 * (np.conj(x) * y).imag
+            size += np.abs(x) ** 2 + np.abs(y) ** 2
+    round_about = np.divide(area, size, out=np.zeros(len(modes)), where=size > 0.0)
+    # a mode of positive frequency: x cos wt - y sin wt with y = -i x goes from x to y
+    return ["backward" if r > CIRCULAR else "forward" if r < -CIRCULAR else "" for r in round_about]
 
 
 def part_kinds(train: Drivetrain) -> dict[str, str]:

@@ -16,7 +16,7 @@ from gearmbs.gears.geometry import turn_z
 from gearmbs.signals import spectrum
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
-from gearmbs.studies.mode_names import train_modes, with_gains
+from gearmbs.studies.mode_names import train_modes, whirl_senses, with_gains
 from gearmbs.studies.run.record import flank_shares
 from gearmbs.studies.same_train import check_record_of
 from gearmbs.studies.train_record import STRAY, recorded_table
@@ -25,6 +25,7 @@ from gearmbs.studies.trains import train_signal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from gearmbs.dae.analyses.modes import Modes
     from gearmbs.view.mesh import Mesh
     from gearmbs.view.scene import Scene
 
@@ -345,12 +346,12 @@ def mesh_orders(train: Drivetrain, harmonics: int = 2) -> dict[str, float]:
 
 
 def train_campbell(
-    train: Drivetrain, speeds: Sequence[Any] | None = None, *, harmonics: int = 2, maximum: float = 2000.0
-) -> xr.Dataset:
+    train: Drivetrain, speeds: Sequence[Any] | None = None, *, harmonics: int = 2, maximum: float = 2000.0,
+    whirl: bool = False,
+) -> xr.Dataset:  # fmt: skip
     """Return the Campbell diagram of a drivetrain: its modes under load against the speed of its first drive.
 
-    The modes are those at rest: of what turns slowly against its bending frequencies the gyroscopic moments count
-    little.
+    The modes are those at rest, where gyroscopic moments count little, or with ``whirl`` those at each speed.
 
     Parameters
     ----------
@@ -361,6 +362,10 @@ def train_campbell(
         Mesh harmonics that excite; where nothing meshes, the shafts do, once a turn, as unbalances excite them.
     maximum : float
         Modes and crossings up to this frequency, Hz.
+    whirl : bool
+        Modes are those of the shafts that turn at each speed, the teeth standing as at rest: bending modes part into
+        whirl forwards and backwards, which ``whirl`` tells over speed and mode, see `gearmbs.studies.whirl_senses`.
+        They are followed in the order of their frequencies; names and gains are those at rest.
 
     Returns
     -------
@@ -379,5 +384,17 @@ def train_campbell(
         if turns(shaft.name) > 0.0
     }
     modes = train_modes(train)
-    found = campbell(modes, turned, orders, maximum=maximum)
-    return with_gains(train, found, modes).assign_attrs(operating_speed=abs(train.drives[0].speed))
+    senses: list[dict[float, str]] = []
+
+    def at_speed(speed: float) -> Modes:
+        found = train_modes(train, speed=speed)
+        told = whirl_senses(train, found) if speed else [""] * len(found)
+        senses.append(dict(zip(found.frequencies.tolist(), told)))
+        return found
+
+    found = campbell(at_speed if whirl else modes, turned, orders, maximum=maximum)
+    found = with_gains(train, found, modes).assign_attrs(operating_speed=abs(train.drives[0].speed))
+    if not whirl:
+        return found
+    told = [[known.get(f, "") for f in row] for known, row in zip(senses, found["frequency"].values.tolist())]
+    return found.assign(whirl=(("speed", "mode"), np.asarray(told, dtype=str)))
