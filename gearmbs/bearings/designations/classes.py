@@ -7,9 +7,11 @@ import re
 from gearmbs.bearings.kinds import BearingError
 from gearmbs.wording import warn
 
-CLASSES = re.compile(r"C(?P<name>N|M|\d+)(?:(?P<half>[HL])(?![A-Z0-9]))?|P[456](?P<short>[0-9])(?![0-9])")
+CLASSES = re.compile(
+    r"C(?P<name>N|(?<!EC)M(?![A-Z])|\d+)(?:(?P<half>[HL])(?![A-Z0-9]))?|P[456](?P<short>[0-9])(?![0-9])"
+)
 """Class of radial clearance among the suffixes: written apart or onto others, "/C3", "ZZC3", with its upper or lower
-half, "C3H", or in short with the class of precision, "P63" for P6 and C3."""
+half, "C3H", or in short with the class of precision, "P63" for P6 and C3. EC before M is a design with a brass cage."""
 TABULATED = ("C2", "CN", "C3", "C4", "C5")
 HYBRID = re.compile(r"(?<![A-Z0-9])HC(?=\d|P|[^A-Z0-9]|$)\d?")
 """Elements of ceramics, with a number for which, that is no class of clearance: "/HC5", "/HC5C3"."""

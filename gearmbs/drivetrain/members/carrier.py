@@ -360,5 +360,5 @@ def add_carrier(
             orientation=axes @ turn_z(angle + flexible.turned), angular_velocity=spin * axes[:, 2],
         )  # fmt: skip
     seat = f"{name} seat"
-    m.joint("fixed", seat, body.marker_at(hub, axes, name=f"{seat}.I"), on.marker_at(hub, axes, name=f"{seat}.J"))
+    m.joint("fixed", seat, body.marker_at(hub, axes, name=f"{seat}.I"), on.marker_at(hub, axes, name=name))
     return body
