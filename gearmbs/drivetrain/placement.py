@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from gearmbs.drivetrain.couplings.aligned import Coupling
-from gearmbs.drivetrain.couplings.misaligned import Misaligned
+from gearmbs.drivetrain.couplings.misaligned import Misaligned, roles
 from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh, Wheel
 from gearmbs.drivetrain.planetary import PlanetaryStage, assemble_stage
@@ -192,6 +192,13 @@ def _place_in_line(train: Drivetrain, tie: Tie, forward: bool, here: str, there:
             f"{tie.coupling.label}: shafts '{tie.first}' and '{tie.second}' are elsewhere by what they are joined with "
             f"otherwise: their places are ({off[0]:.4g}, {off[1]:.4g}, {off[2]:.4g}) mm apart and their axes at "
             f"{turned:.4g} deg; give its angle, direction and offset so, or leave out what places them",
+        )
+    if tie.coupling is not None and abs(along) > CLOSED:
+        role = roles(train.couplings, {bearing.shaft for bearing in train.bearings}).get(tie.name, "")
+        require(
+            not tie.coupling.holds(role)[:, 2].any(),
+            f"{tie.coupling.label}: its places on '{tie.first}' and '{tie.second}' are {MM * abs(along):.4g} mm apart "
+            "along the axis, which it holds; change its stations or the place of a shaft",
         )
     require(
         across <= CLOSED and parallel,

@@ -159,6 +159,12 @@ class PlanetaryStage(Part):
         known = {member: train.speeds.get(on, 0.0) for member, on in self.holders.items()}
         return self.gears.speeds(sun=known["sun"], carrier=known["carrier"]) | known
 
+    def starting(self, train: Drivetrain) -> dict[str, float]:
+        """Return the same at the start of a simulation: behind a universal joint all turn at another pace."""
+        share, paces = train.start_share, train.layout.paces
+        known = {m: share * paces.get(on, 1.0) * train.speeds.get(on, 0.0) for m, on in self.holders.items()}
+        return self.gears.speeds(sun=known["sun"], carrier=known["carrier"]) | known
+
     def sense(self, train: Drivetrain) -> int:
         """Return the sense of rotation about the axis, see `gearmbs.gears.PlanetarySet.sense`."""
         return self.with_rotation(train).sense(self.speeds(train))
@@ -568,11 +574,10 @@ def assemble_stage(
 
 def add_stage(m: Mechanism, train: Drivetrain, layout: Layout, stage: PlanetaryStage) -> None:
     """Add planets, pins and meshes of a stage to the mechanism of its drivetrain."""
-    turning = stage.turning(train)
-    member, shaft = next(iter(turning.items()))
+    member, shaft = next(iter(stage.turning(train).items()))
     seat = layout.seats[shaft]
     origin, axes = seat.at(stage.station(train, member)), seat.axes
-    share, speeds = train.start_share, stage.speeds(train)
+    turns = stage.starting(train)
     carrier_angle = layout.angles.get(stage.carrier, 0.0)
 
     def wheel(member: str, angle: float) -> Marker:
@@ -582,15 +587,14 @@ def add_stage(m: Mechanism, train: Drivetrain, layout: Layout, stage: PlanetaryS
         turned = axes @ turn_z(angle + layout.angles.get(on, 0.0))
         return body.marker_at(origin, turned, name=name)
 
-    planets = range(1, stage.gears.planets + 1)
+    planets = [stage.planet(k) for k in range(1, stage.gears.planets + 1)]
     start = {
-        "planets": np.array([layout.angles[stage.planet(k)] - carrier_angle for k in planets]),
-        "steps": np.array([layout.wheels[stage.planet(k)] for k in planets]),
+        "planets": np.array([layout.angles[planet] - carrier_angle for planet in planets]),
+        "steps": np.array([layout.wheels[planet] for planet in planets]),
     }
     ring = wheel("ring", layout.wheels[f"{stage.name} ring"])
     carrier, sense = add_carrier(m, train, stage, origin, axes, carrier_angle), stage.sense(train)
     members = Members(wheel("sun", 0.0), carrier, ring, origin, axes, carrier_angle, f"{stage.name} ", sense)
-    turns = {name: share * speeds[name] for name in ("carrier", "planet")}
     with errors_named(stage.label):
         gears = stage.with_rotation(train)
         add_planets(m, gears, members, start, stage.weights["planet"], turns, stage.on_pins)

@@ -11,6 +11,8 @@ from gearmbs.drivetrain import (
     FlexibleCoupling,
     GearMesh,
     IdealBearing,
+    PlanetaryStage,
+    RigidCoupling,
     Shaft,
     SpeedDrive,
     TorqueLoad,
@@ -18,7 +20,7 @@ from gearmbs.drivetrain import (
     Wheel,
 )
 from gearmbs.drivetrain.couplings.even_twist import EvenTwist
-from gearmbs.gears import GearSpec
+from gearmbs.gears import GearSpec, planetary
 from gearmbs.mechanism import Mechanism
 from tests.drivetrain.support import differences, evaluate, frame
 from tests.says import says
@@ -242,6 +244,52 @@ def test_places_that_do_not_fit_a_coupling_are_told():
             shafts=[Shaft(name="one", position=(0, 0, 0)), Shaft(name="two", position=(0, 0, 0.5))],
             couplings=[joint], bearings=plain.bearings, drives=plain.drives, loads=plain.loads,
         )  # fmt: skip
+
+
+def test_places_that_a_coupling_holds_along_the_axis_have_to_meet():
+    def apart(coupling):
+        plain = line(coupling)
+        return Drivetrain(
+            "gap",
+            shafts=[Shaft(name="one", length=0.3, position=(0, 0, 0)), Shaft(name="two", position=(0, 0, 0.31))],
+            couplings=[coupling], bearings=plain.bearings, drives=plain.drives, loads=plain.loads,
+        )  # fmt: skip
+
+    for coupling in (
+        flexible(axial=1e6),
+        RigidCoupling(name="c", first="one", second="two"),
+        UniversalJoint(name="c", first="one", second="two", carries="all"),
+    ):
+        with pytest.raises(DrivetrainError, match=says("'c'", "'one'", "'two'", "10 mm")):
+            apart(coupling)
+    # what slides along it may be shorter than the gap
+    for coupling in (flexible(radial=1e6), UniversalJoint(name="c", first="one", second="two")):
+        _ = apart(coupling)
+
+
+@pytest.mark.parametrize("body", [None, {"radial": 1e9, "tangential": 1e9}])
+def test_planets_behind_a_joint_start_at_its_pace(body):
+    """The joint turns its second shaft by 1 / cos beta of the mean where p is zero; carrier and planets with it."""
+    cosine = np.cos(np.deg2rad(25.0))
+    plain = line(UniversalJoint(name="j", first="one", second="two", angle="25 deg"), torque=0.0)
+    gears = planetary((24, 30, 84), "1.5 mm", 3, carrier_radius="40.5 mm")
+    train = Drivetrain(
+        "behind",
+        shafts=[*plain.shafts, Shaft(name="out", length="100 mm", diameter="20 mm")],
+        couplings=plain.couplings,
+        bearings=[*plain.bearings, IdealBearing(name="at out", shaft="out")],
+        planetary_stages=[PlanetaryStage(name="set", gears=gears, sun="two", carrier="out", ring="ground",
+                                         sun_station="250 mm", carrier_body=body)],
+        drives=plain.drives,
+        loads=[TorqueLoad(name="load", shaft="out", torque=20.0)],
+        running=True,
+    )  # fmt: skip
+    bodies, axis = train.build().bodies, train.layout.seats["out"].axes[:, 2]
+    for name in ("two", "out", "set planet 1", *(["set carrier"] if body else [])):
+        mean = {**train.turning, "set carrier": train.speeds["out"]}[name]
+        assert bodies[name].angular_velocity @ axis == pytest.approx(mean / cosine, rel=1e-12)
+    moved = bodies["set planet 1"].velocity
+    assert np.linalg.norm(moved) == pytest.approx(40.5e-3 * train.speeds["out"] / cosine, rel=1e-9)
 
 
 FILE = """

@@ -343,7 +343,7 @@ def add_carrier(
         Of the carrier, rad.
     """
     on = m.ground if stage.carrier == "ground" else m.bodies[stage.carrier]
-    spin = train.start_share * train.speeds.get(stage.carrier, 0.0)
+    spin = stage.starting(train)["carrier"]
     name, flexible = stage.carrier_name, stage.flexible_carrier
     if flexible is None:
         shaft = train.parts.get(stage.carrier)
