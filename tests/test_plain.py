@@ -259,7 +259,7 @@ def test_the_mode_by_the_version_of_numba():
         assert is_plain("", f"{first + 1}.0")
 
 
-OWN_STAGES = {"cache", "jit", "lanes", "late", "library", "objects", "pointers", "views"}
+OWN_STAGES = {"cache", "jit", "lanes", "late", "library", "objects", "pointers", "straight", "views"}
 """Modules that the plain mode does not import."""
 
 

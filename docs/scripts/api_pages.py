@@ -117,8 +117,7 @@ MORE = {
             "best_reference",
             "momentum_from_conjugate",
         ],
-        "gearmbs.dae.equations.constraints.terms": ["gradient", "quadratic_part"],
-        "gearmbs.dae.equations.constraints.hessians": ["hessian"],
+        "gearmbs.dae.equations.constraints.terms": ["gradient", "quadratic_part", "hessian"],
         "gearmbs.dae.equations.loads.forces": ["impact", "friction_over_speed"],
     },
     "gearmbs.studies": {

@@ -8,7 +8,7 @@ import numpy as np
 from gearmbs.kernels.jit import njit
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def smooth_part(delta, width):
     """Return s(delta) and its slope."""
     _0 = delta + width
@@ -19,7 +19,7 @@ def smooth_part(delta, width):
     return _2 * _3 * _4, _4 * (_3 * (_1 + 2.0 * _1) - _2)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def smooth_part_by_width(delta, width):
     """Return its slope by the width."""
     _0 = width * width
@@ -31,7 +31,7 @@ def smooth_part_by_width(delta, width):
     return _1 * (_2 * (_4 + 2.0 * _4) + 3.0 * _5) - (16.0 * (_5 * _2 * (_1 * _1 * (_0 + 2.0 * _0))))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def friction_torque(rolling, viscous, slow, total, speed):
     """Return the friction torque, its slopes by the sum of forces and the speed."""
     _0 = rolling * total
@@ -44,7 +44,7 @@ def friction_torque(rolling, viscous, slow, total, speed):
     return -(_1 * _2 + _3 * _5), -(_2 * (rolling * speed)), -_6
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def friction_torque_changed(rolling, viscous, slow, total, speed, d_rolling, d_viscous, d_slow):
     """Return its change."""
     _0 = 1.0 / np.sqrt(speed * speed + slow * slow)
@@ -54,21 +54,21 @@ def friction_torque_changed(rolling, viscous, slow, total, speed, d_rolling, d_v
     return d_slow * _3 - (d_rolling * (_0 * (total * speed)) + d_viscous * (speed * _2))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def hertz_changed(stiffness, exponent, part, d_stiffness, d_part):
     """Return the change of Hertz's force."""
     _0 = part ** (exponent - 1.0)
     return d_stiffness * (part * _0) + d_part * (stiffness * (exponent * _0))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def roller_changed(x, y, nx, ny, gap, d_nx, d_ny, d_gap):
     """Return the changes of a roller's approach and of the direction of its normal."""
     _0 = 1.0 / np.sqrt(ny * ny + nx * nx)
     return x * d_nx + y * d_ny - d_gap, d_ny * (_0 * (nx * _0)) - (d_nx * (_0 * (ny * _0)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def ball_contact(x, y, stiffness, part, part_slope, law):
     """Write the law of a ball's contact, by the smooth part of its deflection and its slope."""
     _0 = np.sqrt(part)
@@ -90,7 +90,7 @@ def ball_contact(x, y, stiffness, part, part_slope, law):
     law[12] = 0.0
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def roller_contact(nx, ny, stiffness, exponent, part, part_slope, law):
     """Write the law of the contact of a slice of a roller, by the smooth part of its deflection and its slope."""
     _0 = part ** (exponent - 1.0)
@@ -110,14 +110,14 @@ def roller_contact(nx, ny, stiffness, exponent, part, part_slope, law):
     law[12] = 0.0
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plain_contact_rate(plane, law, radius, height):
     """Return the rate of a path's deflection."""
     u_rate, w_rate, phi_rate, nx, ny = plane[3], plane[4], plane[5], law[1], law[2]
     return u_rate * nx + w_rate * ny + phi_rate * (nx * height - (ny * radius))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plain_contact_forces(plane, law, radius, height, chi, sums):
     """Add the forces of a path."""
     u_rate, w_rate, phi_rate, force, nx, ny = plane[3], plane[4], plane[5], law[0], law[1], law[2]
@@ -129,7 +129,7 @@ def plain_contact_forces(plane, law, radius, height, chi, sums):
     sums[3] += _1
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plain_contact_slopes(plane, law, radius, height, chi, sums):
     """Add the derivatives of a path's forces."""
     u_rate, w_rate, phi_rate, force, nx, ny, force_x, force_y = plane[3], plane[4], plane[5], law[0], law[1], law[2], law[3], law[4]
@@ -180,7 +180,7 @@ def plain_contact_slopes(plane, law, radius, height, chi, sums):
     sums[27] += _19
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def contact_changed(plane, law, profile, radius, height, chi, changes, sums):
     """Add the change of a path's forces."""
     phi, u_rate, w_rate, phi_rate, psi_rate, theta_rate, beta_rate, force = plane[2], plane[3], plane[4], plane[5], plane[6], plane[7], plane[8], law[0]
@@ -240,7 +240,7 @@ def contact_changed(plane, law, profile, radius, height, chi, changes, sums):
     sums[6] += _43 - (d_outer * _0) + d_inner * _31 - (d_spin * _32)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def contact_rate(plane, law, profile, radius, height):
     """Return the rate of a path's deflection."""
     u_rate, w_rate, phi_rate, psi_rate, theta_rate, beta_rate, nx, ny = plane[3], plane[4], plane[5], plane[6], plane[7], plane[8], law[1], law[2]
@@ -249,7 +249,7 @@ def contact_rate(plane, law, profile, radius, height):
     return _0 - (beta_rate * spin)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def contact_forces(plane, law, profile, radius, height, chi, sums):
     """Add the forces of a path."""
     u_rate, w_rate, phi_rate, psi_rate, theta_rate, beta_rate, force, nx = plane[3], plane[4], plane[5], plane[6], plane[7], plane[8], law[0], law[1]
@@ -267,7 +267,7 @@ def contact_forces(plane, law, profile, radius, height, chi, sums):
     sums[6] += _3
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def contact_slopes(plane, law, profile, radius, height, chi, sums):
     """Add the derivatives of a path's forces."""
     u_rate, w_rate, phi_rate, psi_rate, theta_rate, beta_rate, force, nx = plane[3], plane[4], plane[5], plane[6], plane[7], plane[8], law[0], law[1]
@@ -412,7 +412,7 @@ def contact_slopes(plane, law, profile, radius, height, chi, sums):
     sums[97] += _44
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plain_element_rates(motion, c, s, plane):
     """Write the rates in the plane of an element."""
     d0, d1, a0, a1, d0_rate, d1_rate, d2_rate, a0_rate = motion[0], motion[1], motion[3], motion[4], motion[5], motion[6], motion[7], motion[8]
@@ -422,7 +422,7 @@ def plain_element_rates(motion, c, s, plane):
     plane[5] = a0_rate * c + a1_rate * s + psi_rate * (a1 * c - (a0 * s))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plain_element_forces(motion, c, s, sums, forces, n):
     """Add the forces of an element on q, and its normal forces."""
     d0, d1, a0, a1, sum0, sum1, sum2, sum3 = motion[0], motion[1], motion[3], motion[4], sums[0], sums[1], sums[2], sums[3]
@@ -435,7 +435,7 @@ def plain_element_forces(motion, c, s, sums, forces, n):
     forces[n] += sum3
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plain_element_slopes(motion, c, s, sums, stiff, damp, n):
     """Add the derivatives of the forces of an element, and of its normal forces, by q, its rates and the load."""
     d0, d1, a0, a1, d0_rate, d1_rate, a0_rate, a1_rate = motion[0], motion[1], motion[3], motion[4], motion[5], motion[6], motion[8], motion[9]
@@ -561,7 +561,7 @@ def plain_element_slopes(motion, c, s, sums, stiff, damp, n):
     damp[n, 5] += _6 * sum25 + _7 * sum27
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def element_rates(motion, c, s, plane):
     """Write the rates in the plane of an element."""
     d0, d1, a0, a1, d0_rate, d1_rate, d2_rate, a0_rate = motion[0], motion[1], motion[3], motion[4], motion[5], motion[6], motion[7], motion[8]
@@ -574,7 +574,7 @@ def element_rates(motion, c, s, plane):
     plane[8] = beta_rate
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def element_forces(motion, c, s, sums, forces, n, spin):
     """Add the forces of an element on q, and its normal forces."""
     d0, d1, a0, a1, sum0, sum1, sum2, sum3 = motion[0], motion[1], motion[3], motion[4], sums[0], sums[1], sums[2], sums[3]
@@ -590,7 +590,7 @@ def element_forces(motion, c, s, sums, forces, n, spin):
     forces[n] += sum6
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def element_slopes(motion, c, s, sums, stiff, damp, n, spin, by_load):
     """Add the derivatives of the forces of an element, and of its normal forces, by q, its rates and the load."""
     d0, d1, a0, a1, d0_rate, d1_rate, a0_rate, a1_rate = motion[0], motion[1], motion[3], motion[4], motion[5], motion[6], motion[8], motion[9]

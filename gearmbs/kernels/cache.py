@@ -44,7 +44,7 @@ from gearmbs.kernels.locks import held
 FORMAT = "4"
 """To be raised when the files or what they hold change."""
 
-MAKERS = ("jit", "library", "cache", "late")
+MAKERS = ("jit", "library", "cache", "late", "straight", "texts")
 """Modules of this package that make what is kept; an edit of theirs makes all of it anew."""
 
 SHIPPED = Path(__file__).with_name("shipped")

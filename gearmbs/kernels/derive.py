@@ -209,9 +209,10 @@ def start() -> None:
         _nodes["number", number.operands[0]] = number
 
 
-def inputs(names: str, array: str = "", first: int = 0) -> list[Value]:
-    """Return arguments of a kernel: each for itself, or as the numbers of an array from one on."""
-    places = [f"{array}[{first + k}]" if array else name for k, name in enumerate(names.split())]
+def inputs(names: str, array: str = "", first: int | str = 0) -> list[Value]:
+    """Return arguments of a kernel: each for itself, or as numbers of an array from one on, a number or a name."""
+    at = [first + k if isinstance(first, int) else f"{first} + {k}" if k else first for k in range(len(names.split()))]
+    places = [f"{array}[{k}]" if array else name for k, name in zip(at, names.split())]
     # of one name there may be several, one for each law
     return [_node("given", place, len(_nodes), name=name) for place, name in zip(places, names.split())]
 
@@ -288,7 +289,7 @@ class Function:
         body += lines.written + ["    " + line for line in written]
         if returned:
             body.append(f"    return {', '.join(returned)}")
-        head = f"@njit(cache=True, {compiled}, forceinline=True)"
+        head = f"@njit(cache=True, straight=True, {compiled}, forceinline=True)"
         return "\n".join([head, f"def {self.name}({self.arguments}):", *body]) + "\n"
 
 

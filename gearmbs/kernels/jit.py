@@ -20,6 +20,7 @@ without a signature is compiled once and not once a literal.
 from __future__ import annotations
 
 import collections
+import contextlib
 from collections.abc import Callable
 from typing import Any
 
@@ -38,6 +39,7 @@ from gearmbs.kernels import cache
 from gearmbs.kernels.ahead import compile_missing
 from gearmbs.kernels.late import late_part
 from gearmbs.kernels.library import EntryLibrary, PartLibrary
+from gearmbs.kernels.straight import straight as straight_line
 
 CompilationError = errors.NumbaError
 """What numba raises where a function cannot be compiled."""
@@ -98,7 +100,14 @@ def _is_negative(variable: ir.Var, func_ir: Any) -> bool:
     return isinstance(made, (ir.Const, ir.Global, ir.FreeVar)) and isinstance(made.value, int) and made.value < 0
 
 
-def njit(signature_or_function: Any = None, *, cache: bool = False, late: bool = False, **options: Any) -> Any:
+def njit(
+    signature_or_function: Any = None,
+    *,
+    cache: bool = False,
+    late: bool = False,
+    straight: bool = False,
+    **options: Any,
+) -> Any:
     """Compile a function for use from Python and from other kernels.
 
     Parameters
@@ -110,6 +119,8 @@ def njit(signature_or_function: Any = None, *, cache: bool = False, late: bool =
     late : bool
         Whether compiled callers look for the kernel when they first call it; see `gearmbs.kernels.late`. It needs a
         signature.
+    straight : bool
+        Whether the kernel has no branches, so that it may be compiled by `gearmbs.kernels.straight`.
     **options
         Further options of `numba.njit`: ``nogil``, ``error_model``, ``fastmath``, ``forceinline``.
 
@@ -122,7 +133,7 @@ def njit(signature_or_function: Any = None, *, cache: bool = False, late: bool =
         return numba.njit(*arguments, **options)
     if callable(signature_or_function) and not sigutils.is_signature(signature_or_function):
         return Kernel(signature_or_function, None, options)
-    return lambda function: Kernel(function, signature_or_function, options, late)
+    return lambda function: Kernel(function, signature_or_function, options, late, straight)
 
 
 class _Overloads(collections.OrderedDict):
@@ -149,13 +160,15 @@ class Kernel(CPUDispatcher):
         The only signature; without it the types of the arguments decide.
     options : dict
         Options of `numba.njit`.
-    late : bool
+    late, straight : bool
         See `njit`.
     """
 
-    def __init__(self, function: Callable, declared: Any, options: dict[str, Any], late: bool = False) -> None:
+    def __init__(
+        self, function: Callable, declared: Any, options: dict[str, Any], late: bool = False, straight: bool = False
+    ) -> None:
         self.declared = declared
-        self.late = late
+        self.late, self.straight = late, straight
         self.options = options
         self._normalised: tuple | None = None
         self._parts: dict[tuple, Any] = {}
@@ -255,6 +268,15 @@ class Kernel(CPUDispatcher):
                     slot.save(PartLibrary.reduce(part))
         return part
 
+    def _text(self) -> Callable:
+        """Return the function that numba is to compile: a straight one has its instructions ready."""
+        fastmath = self.options.get("fastmath", ())
+        if self.straight:
+            with contextlib.suppress(OSError):
+                # without its source numba takes the long way to the same instructions
+                return straight_line(self.py_func, ("fast",) if fastmath is True else fastmath or ())
+        return self.py_func
+
     def _compile(self, library: Any, args: tuple, result: Any, name: str) -> Any:
         flags = _Flags()
         self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
@@ -263,7 +285,7 @@ class Kernel(CPUDispatcher):
         code.enable_object_caching()
         pipeline = type("Pipeline", (_Pipeline,), {"name": name})
         compiled = compiler.compile_extra(
-            self.typingctx, self.targetctx, self.py_func, args, result, flags, {}, code, pipeline
+            self.typingctx, self.targetctx, self._text(), args, result, flags, {}, code, pipeline
         )
         if compiled.typing_error is not None:
             raise compiled.typing_error

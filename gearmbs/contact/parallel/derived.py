@@ -8,7 +8,7 @@ import numpy as np
 from gearmbs.kernels.jit import njit
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def corner_1(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radius, rounding, contact):
     """Write the contact of a tip corner of wheel 1 on an involute."""
     _0 = a * sin
@@ -34,7 +34,7 @@ def corner_1(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radiu
     contact[6] = _2 + 0.5 * _7
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def corner_1_slopes(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radius, rounding, contact):
     """Write the derivatives of the contact of a tip corner of wheel 1 on an involute."""
     _0 = radius * (sin * cos_eta + cos * sin_eta)
@@ -83,7 +83,7 @@ def corner_1_slopes(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta
     contact[16] = 0.5 * (0.5 * (_11 * _28 + _10 * _29) - base)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def corner_2(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radius, rounding, contact):
     """Write the contact of a tip corner of wheel 2 on an involute."""
     _0 = a * sin
@@ -108,7 +108,7 @@ def corner_2(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radiu
     contact[6] = _2 + 0.5 * _6
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def corner_2_slopes(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radius, rounding, contact):
     """Write the derivatives of the contact of a tip corner of wheel 2 on an involute."""
     _0 = radius * (sin * cos_eta + cos * sin_eta)
@@ -157,7 +157,7 @@ def corner_2_slopes(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta
     contact[16] = -(0.5 * (_10 + 0.5 * (0.5 * (_10 * _18) + 0.5 * (_17 * _15))) + _4 * (base + 0.5 * _24))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plane_1(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta, radius, rounding, contact):
     """Write the contact of a tip corner of wheel 1 on a plane."""
     _0 = cos_eta * radius
@@ -181,7 +181,7 @@ def plane_1(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta
     contact[6] = rounding + radius * (cos_turn * sin_eta - (sin_turn * cos_eta)) + 0.5 * _8
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plane_1_slopes(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta, radius, rounding, contact):
     """Write the derivatives of the contact of a tip corner of wheel 1 on a plane."""
     _0 = sin_eta * radius
@@ -217,7 +217,7 @@ def plane_1_slopes(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, 
     contact[16] = 0.5 * _15 - _20
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plane_2(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta, radius, rounding, contact):
     """Write the contact of a tip corner of wheel 2 on a plane."""
     _0 = cos_eta * radius
@@ -241,7 +241,7 @@ def plane_2(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta
     contact[6] = base * before + 0.5 * _8
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plane_2_slopes(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta, radius, rounding, contact):
     """Write the derivatives of the contact of a tip corner of wheel 2 on a plane."""
     _0 = cos_eta * radius
@@ -276,14 +276,14 @@ def plane_2_slopes(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, 
     contact[16] = 0.5 * _15
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def contact_rates(a, rate_1, rate_2, contact):
     """Return the rate of the gap and the sliding velocity."""
     by_1, by_2, sin, normal = contact[2], contact[3], contact[4], contact[6]
     return rate_1 * by_1 + rate_2 * by_2, -(rate_2 * (a * sin) + normal * (rate_1 - rate_2))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def contact_wrench(a, force, ratio, rate_1, rate_2, contact, sums):
     """Add the wrench of a contact."""
     by_a, by_1, by_2, sin, cos, normal = contact[1], contact[2], contact[3], contact[4], contact[5], contact[6]
@@ -293,7 +293,7 @@ def contact_wrench(a, force, ratio, rate_1, rate_2, contact, sums):
     sums[2] += force * by_1 - (normal * _0)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def contact_slopes(a, force, stiffness, damping, ratio, ratio_slope, rate_1, rate_2, contact, sums):
     """Add the derivatives of the wrench of a contact by both angles and their rates."""
     by_a, by_1, by_2, sin, cos, normal, alpha_1, alpha_2 = contact[1], contact[2], contact[3], contact[4], contact[5], contact[6], contact[7], contact[8]

@@ -8,7 +8,7 @@ import numpy as np
 from gearmbs.kernels.jit import njit
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
 def involute_slopes(A, B, kap, s, rb, w, i_w, one, m, m_w, m_ww):
     """Return h and its slopes by alpha, A, B, F and what else there is."""
     _0 = kap * i_w
@@ -17,7 +17,7 @@ def involute_slopes(A, B, kap, s, rb, w, i_w, one, m, m_w, m_ww):
     return s * _0, _1 * (_1 * (w * rb)) * _0 + s * (i_w * (_1 * (A * B))), rb * (one * (B * i_w)) * _0 + s * (kap * (i_w * (A * _2))), (rb * (_1 * (_1 * (one * (i_w * (A * (w + B * B))))))) * _0 + s * (kap * (i_w * (B * _2)) - (i_w * (B * _1))), rb * _0
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
 def involute_curvatures(A, B, kap, s, rb, w, i_w, one, m, m_w, m_ww):
     """Return the upper half of its second derivatives."""
     _0 = 1.0 / kap
@@ -62,7 +62,7 @@ def involute_curvatures(A, B, kap, s, rb, w, i_w, one, m, m_w, m_ww):
     return _7 - (_8 * (_2 * _10 + _0 * (_1 * _10))) + _7 + s * (i_w * (_0 * (_11 - (A * A)) - (_4 * _10))), _3 * _15 - (_8 * (_0 * (_0 * (A * i_w * rb)))) + _17 * _6 + s * (_19 + _5 * _14), _29, rb * _6, _32, _35, rb * _15, _36 + _37 + _37 + s * (kap * (_21 * _22 + i_w * (_12 + 2.0 * (B * _34))) - _38 - (_38 + i_w * (_0 + B * _20))), rb * _23, 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
 def helicoid_slopes(A, B, kap, c, K, R, U, V, inverse, s, Z, rb, t, w, i_w, one, m, m_w, m_ww):
     """Return h and its slopes by alpha, A, B, F and what else there is."""
     _0 = U * s + V * Z
@@ -75,7 +75,7 @@ def helicoid_slopes(A, B, kap, c, K, R, U, V, inverse, s, Z, rb, t, w, i_w, one,
     return inverse * _0, inverse * (s * (R * V) + U * (rb * _1 * (1.0 / (U * inverse))) + Z * (R * (c * U))), _3, 2.0 * (inverse * (inverse * (B * c)) * _0) + inverse * (_6 - (Z * (i_w * (B * _2) - (t * _5)))), inverse * (U * rb), V * inverse
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
 def helicoid_curvatures(A, B, kap, c, K, R, U, V, inverse, s, Z, rb, t, w, i_w, one, m, m_w, m_ww):
     """Return the upper half of its second derivatives."""
     _0 = R * V
@@ -145,7 +145,7 @@ def helicoid_curvatures(A, B, kap, c, K, R, U, V, inverse, s, Z, rb, t, w, i_w, 
     return inverse * _12, 2.0 * (_14 * _15) + inverse * _22, 2.0 * (_25 * _15) + inverse * (_41 + Z * (_34 * _6 - (R * (c * _40)))), inverse * (rb * _0), inverse * _7, 2.0 * (_42 * (2.0 * (_13 * _14) + inverse * (2.0 * (_9 * _14) + _43)) + _45) + 2.0 * _45 + inverse * _51, _56, 2.0 * (_14 * _57) - (inverse * (rb * _21)), 2.0 * (V * _14) + inverse * _19, 2.0 * (_42 * (2.0 * (_24 * _25) + inverse * (_43 + 2.0 * (_23 * _25))) + _58) + 2.0 * _58 + inverse * _63, 2.0 * (_25 * _57) - (inverse * (rb * _40)), 2.0 * (V * _25) - (inverse * _37), 0.0, 0.0, 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
 def corner_slopes(A, B, kap, sn, cs, V, radius, rounding, w, i_w, one, m, m_w, m_ww):
     """Return h and its slopes by alpha, A, B, F and what else there is."""
     _0 = A * m
@@ -155,7 +155,7 @@ def corner_slopes(A, B, kap, sn, cs, V, radius, rounding, w, i_w, one, m, m_w, m
     return radius * (sn + V * _0) + i_w * _1, radius * (cs + V * (B * m)) + i_w * (_2 * (A * B) * rounding), radius * (sn * _0 + V * (m - (A * (i_w * (A * m_w))))) + i_w * (A * _3) * _1, radius * (cs * _0 - (V * (A * (i_w * (B * m_w))))) + i_w * (B * _3) * _1 - (i_w * (B * _2 * rounding)), radius * (cs + (A * cs - (B * sn)) * _0)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
 def corner_curvatures(A, B, kap, sn, cs, V, radius, rounding, w, i_w, one, m, m_w, m_ww):
     """Return the upper half of its second derivatives."""
     _0 = 1.0 / kap

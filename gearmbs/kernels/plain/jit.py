@@ -33,8 +33,8 @@ from gearmbs.logs import tell
 CompilationError = numba.NumbaError
 """What numba raises where a function cannot be compiled."""
 
-OWN_OPTIONS = {"forceinline"}
-"""Options of kernels that numba does not document; all that they change is time."""
+OWN_OPTIONS = {"forceinline", "straight"}
+"""Options of kernels that numba does not document, or has not; all that they change is time."""
 
 CHOSEN = numba.config.CACHE_DIR
 """``NUMBA_CACHE_DIR``."""

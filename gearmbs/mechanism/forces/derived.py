@@ -8,7 +8,7 @@ import numpy as np
 from gearmbs.kernels.jit import njit
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def line_load(one, two, law, wrench):
     """Write the force of a spring along a line."""
     i_px, i_py, i_pz, i_vx, i_vy, i_vz, j_px, j_py = one[0], one[1], one[2], one[12], one[13], one[14], two[0], two[1]
@@ -25,7 +25,7 @@ def line_load(one, two, law, wrench):
     wrench[0, 2] = _2 * _6
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def line_slopes(one, two, law, jac):
     """Write the derivatives of the force of a spring along a line."""
     i_px, i_py, i_pz, i_vx, i_vy, i_vz, j_px, j_py = one[0], one[1], one[2], one[12], one[13], one[14], two[0], two[1]
@@ -116,7 +116,7 @@ def line_slopes(one, two, law, jac):
     jac[2, 20] = _47
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def axis_load(one, two, law, angle, wrench):
     """Write the torque of a spring about an axis."""
     i_wx, i_wy, i_wz, j_wx, j_wy, j_wz, j_az, j_bz = one[15], one[16], one[17], two[15], two[16], two[17], two[5], two[8]
@@ -127,7 +127,7 @@ def axis_load(one, two, law, angle, wrench):
     wrench[0, 5] = j_cz * _0
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def axis_slopes(one, two, law, angle, angle_x, angle_y, angle_z, jac):
     """Write the derivatives of the torque of a spring about an axis."""
     i_wx, i_wy, i_wz, j_wx, j_wy, j_wz, j_az, j_bz = one[15], one[16], one[17], two[15], two[16], two[17], two[5], two[8]
@@ -195,7 +195,7 @@ def axis_slopes(one, two, law, angle, angle_x, angle_y, angle_z, jac):
     jac[5, 23] = _24
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def shifts(one, two, seen):
     """Write displacements and velocities in the axes of J."""
     i_px, i_py, i_pz, i_vx, i_vy, i_vz, i_wx, i_wy = one[0], one[1], one[2], one[12], one[13], one[14], one[15], one[16]
@@ -222,7 +222,7 @@ def shifts(one, two, seen):
     seen[8] = j_az * _6 + j_bz * _7 + j_cz * _8
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def shift_slopes(one, two, slopes):
     """Write their derivatives."""
     i_px, i_py, i_pz, i_vx, i_vy, i_vz, i_wx, i_wy = one[0], one[1], one[2], one[12], one[13], one[14], one[15], one[16]

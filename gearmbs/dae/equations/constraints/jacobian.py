@@ -9,7 +9,6 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.frames import is_elastic, touches_elastic
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.constraints.elastic import put_linear_side, put_row
-from gearmbs.dae.equations.constraints.hessians import HESSIAN_BLOCKS, hessian
 from gearmbs.dae.equations.kinematics import euler_component
 from gearmbs.dae.equations.loads import expressions
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_HESSIAN, S_TERM, S_VECTOR
@@ -153,7 +152,7 @@ def hessian_entries(mode, j, r, lam, mu, y, idata, tab, slot, vals, k):
         any_block = False
         for bn in range(4):
             b2 = tab.marker_body[tab.term[j, T.TERM_I + bn // 2]]
-            if b2 == 0 or not HESSIAN_BLOCKS[kind, bm, bn]:
+            if b2 == 0 or not terms.HESSIAN_BLOCKS[kind, bm, bn]:
                 continue
             any_block = True
             other = tab.at[b2, T.AT_THETA] if bn % 2 == 1 else tab.at[b2, T.AT_R]
@@ -216,7 +215,7 @@ def row_entries(mode, r, y, yp, cj, idata, tab, slot, vals, k):
                         rate_rows, tab.at, tab.partial,
                     )  # fmt: skip
             continue
-        hessian(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, hess, s)
+        terms.hessian(j, tab.term, tab.fval, tab.marker_body, tab.kin, tab.frame, hess, s)
         if elastic:
             k = elastic_term_entries(
                 mode, j, coef, lam_value, mu_value, factor, rate_rows, lam, mu, y, g, gt, tab, slot, vals, k

@@ -2,8 +2,8 @@
 
 A constraint row is Phi = sum_c coef_c phi_c(I_c, J_c) - f(t).  Each term gives its value, its spatial
 gradient [dR_I, dpi_I, dR_J, dpi_J] (the bodies', not the markers', variations), the partial time
-derivative, and the quadratic velocity part of its second time derivative; `hessians` has its exact
-Hessian, from which the derivatives of Phi_q^T lambda and Phi_q q' follow.
+derivative, the quadratic velocity part of its second time derivative, and its exact Hessian, from which the
+derivatives of Phi_q^T lambda and Phi_q q' follow. All of them are of `gearmbs.dae.equations.constraints.definitions`.
 """
 
 from __future__ import annotations
@@ -11,65 +11,16 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
+from gearmbs.dae.equations.constraints import derived as D
 from gearmbs.dae.equations.rotation import KIN_FORCE, KIN_MOMENT, KIN_R, KIN_SHIFT, KIN_TURN, KIN_V, KIN_W
 from gearmbs.dae.equations.unknowns import NUMBERS, add_pair, put_pair
 from gearmbs.kernels.jit import njit
-
-# Rates of what constraint terms measure: points fixed in bodies, and products of axes fixed in two bodies.
-#
-# Vectors are triples of numbers. Second rates are without the terms in accelerations; those of points follow from
-# w x (w x r) = (w . r) w - (w . w) r.
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def vector(a, k):
     """Return ``a[k : k + 3]`` as a triple."""
     return a[k], a[k + 1], a[k + 2]
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def scalar_product(a, b):
-    """Return a . b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def vector_product(a, b):
-    """Return a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def point_motion(v, w, r):
-    """Return the velocity and the second rate of the point r from the origin of a body that moves with v and w."""
-    along, square = scalar_product(w, r), scalar_product(w, w)
-    rate = v[0] + w[1] * r[2] - w[2] * r[1], v[1] + w[2] * r[0] - w[0] * r[2], v[2] + w[0] * r[1] - w[1] * r[0]
-    return rate, (w[0] * along - square * r[0], w[1] * along - square * r[1], w[2] * along - square * r[2])
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def product_motion(a, b, w_a, w_b):
-    """Return a . b, its rate and second rate, and a x b, for vectors fixed in bodies that turn with w_a and w_b.
-
-    a x b is the gradient with respect to the rotation of a's body, and its negative that of b's.
-    """
-    s = vector_product(a, b)
-    phi = scalar_product(a, b)
-    rate = scalar_product(s, w_a) - scalar_product(s, w_b)
-    aa, ab, bb = scalar_product(w_a, w_a), scalar_product(w_a, w_b), scalar_product(w_b, w_b)
-    a_a, a_b, b_a, b_b = (
-        scalar_product(w_a, a), scalar_product(w_a, b), scalar_product(w_b, a), scalar_product(w_b, b)
-    )  # fmt: skip
-    return phi, rate, a_a * a_b + b_a * b_b + 2.0 * (ab * phi - a_b * b_a) - (aa + bb) * phi, s
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def product_with_fixed(a, b, w_a):
-    """Return what `product_motion` does for a vector b that does not move."""
-    s = vector_product(a, b)
-    phi = scalar_product(a, b)
-    bent = scalar_product(w_a, a) * scalar_product(w_a, b) - scalar_product(w_a, w_a) * phi
-    return phi, scalar_product(s, w_a), bent, s
 
 
 POINT = 0
@@ -85,6 +36,19 @@ ANGLE = 4
 ROTATION = 5
 """x_I times y_J turned by f(t): zero when I is turned by f(t) about z_J."""
 
+HESSIAN_BLOCKS = np.zeros((6, 4, 4), dtype=np.bool_)
+"""Which 3x3 blocks of a term's Hessian over [R_I, theta_I, R_J, theta_J] can differ from zero."""
+for _kind, _blocks in {
+    POINT: [(1, 1), (3, 3)],
+    DOT1: [(1, 1), (1, 3), (3, 1), (3, 3)],
+    DOT2: [(0, 3), (3, 0), (2, 3), (3, 2), (1, 1), (1, 3), (3, 1), (3, 3)],
+    DISTANCE: [(a, b) for a in range(4) for b in range(4)],
+    ANGLE: [(1, 1), (1, 3), (3, 1), (3, 3)],
+    ROTATION: [(1, 1), (1, 3), (3, 1), (3, 3)],
+}.items():
+    for _block in _blocks:
+        HESSIAN_BLOCKS[(_kind, *_block)] = True
+
 
 @njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def dot3(a, i, b, j):
@@ -99,9 +63,10 @@ def cross3(a, i, b, j, out, k):
     out[k], out[k + 1], out[k + 2] = x, y, z
 
 
-@njit("void(float64[::1], int64, float64[::1], int64, float64)", cache=True, error_model="numpy")
-def copy3(a, i, out, k, factor):
-    out[k], out[k + 1], out[k + 2] = factor * a[i], factor * a[i + 1], factor * a[i + 2]
+@njit(cache=True, error_model="numpy", forceinline=True)
+def axes_of(term, k):
+    """Return where the axes of I and of J stand in the rows of their markers' frames."""
+    return T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3), T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
 
 
 @njit(
@@ -133,16 +98,6 @@ def turned_axis(frame, j, f, out, k):
     c, s = np.cos(f), np.sin(f)
     for m in range(3):
         out[k + m] = c * frame[j, T.MK_AXES + 3 + m] - s * frame[j, T.MK_AXES + m]
-
-
-@njit("void(float64[:, ::1], int64, float64, float64[::1], int64, int64)", cache=True, error_model="numpy")
-def turned_axes(frame, j, f, out, k, k2):
-    """Write n = y_J cos f - x_J sin f to ``out[k:k+3]`` and its derivative dn/df to ``out[k2:k2+3]``."""
-    c, s = np.cos(f), np.sin(f)
-    for m in range(3):
-        x, y = frame[j, T.MK_AXES + m], frame[j, T.MK_AXES + 3 + m]
-        out[k + m] = c * y - s * x
-        out[k2 + m] = -s * y - c * x
 
 
 @njit(cache=True, error_model="numpy")
@@ -181,58 +136,19 @@ def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
         g[9 + c1], g[9 + c2] = -frame[j, c2], frame[j, c1]
         return kin[bi, KIN_R + c] + frame[i, c] - kin[bj, KIN_R + c] - frame[j, c], 0.0
     if kind == DOT1:
-        a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
-        b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
-        cross3(frame[i], a, frame[j], b, g, 3)
-        copy3(g, 3, g, 9, -1.0)
-        return dot3(frame[i], a, frame[j], b), 0.0
+        a, b = axes_of(term, k)
+        return D.dot_slopes(frame[i], a, frame[j], b, g), 0.0
     if kind == ROTATION:
         fun = term[k, T.TERM_FUNCTION]
-        f, f1 = fval[fun, 0], fval[fun, 1]
-        turned_axes(frame, j, f, scratch, 0, 3)
-        copy3(scratch, 3, scratch, 3, f1)
-        a = T.MK_AXES
-        cross3(frame[i], a, scratch, 0, g, 3)
-        copy3(g, 3, g, 9, -1.0)
-        cross3(frame[i], a, scratch, 3, gt, 3)
-        copy3(gt, 3, gt, 9, -1.0)
-        return dot3(frame[i], a, scratch, 0), dot3(frame[i], a, scratch, 3)
+        return D.rotation_slopes(frame[i], frame[j], fval[fun, 0], fval[fun, 1], g, gt)
     if kind == ANGLE:
-        a = T.MK_AXES
-        s = dot3(frame[i], a, frame[j], a + 3)
-        c = dot3(frame[i], a, frame[j], a)
-        rho = c * c + s * s
-        cross3(frame[i], a, frame[j], a + 3, scratch, 0)
-        cross3(frame[i], a, frame[j], a, scratch, 3)
-        for m in range(3):
-            g[3 + m] = (c * scratch[m] - s * scratch[3 + m]) / rho
-            g[9 + m] = -g[3 + m]
-        turn = np.arctan2(s, c) - reference[k]
+        sine, cosine = D.angle_slopes(frame[i], frame[j], g)
+        turn = np.arctan2(sine, cosine) - reference[k]
         return reference[k] + turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi)), 0.0
     separation(kin, frame, bi, bj, i, j, scratch, 0)
     if kind == DOT2:
-        b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
-        copy3(frame[j], b, g, 0, 1.0)
-        copy3(frame[j], b, g, 6, -1.0)
-        cross3(frame[i], 0, frame[j], b, g, 3)
-        for c in range(3):
-            scratch[3 + c] = scratch[c] + frame[j, c]
-        cross3(frame[j], b, scratch, 3, g, 9)
-        return dot3(frame[j], b, scratch, 0), 0.0
-    length = np.sqrt(dot3(scratch, 0, scratch, 0))
-    copy3(scratch, 0, scratch, 0, 1.0 / length)
-    copy3(scratch, 0, g, 0, 1.0)
-    copy3(scratch, 0, g, 6, -1.0)
-    cross3(frame[i], 0, scratch, 0, g, 3)
-    cross3(scratch, 0, frame[j], 0, g, 9)
-    return length, 0.0
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def product_rates(a, ka, kin_i, kin_j, s):
-    """Return first and second rate (without accelerations) of a . b, b in ``s[0:3]`` fixed in body J."""
-    _, first, second, _ = product_motion(vector(a, ka), vector(s, 0), vector(kin_i, KIN_W), vector(kin_j, KIN_W))
-    return first, second
+        return D.offset_slopes(frame[i], frame[j], axes_of(term, k)[1], scratch, g), 0.0
+    return D.distance_slopes(frame[i], frame[j], scratch, g), 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -241,53 +157,72 @@ def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     kind = term[k, T.TERM_TYPE]
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
     bi, bj = marker_body[i], marker_body[j]
-    if kind == DOT1 or kind == ROTATION or kind == ANGLE:
-        a = T.MK_AXES
-        if kind == DOT1:
-            a += 3 * (term[k, T.TERM_AXES] // 3)
-            copy3(frame[j], T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3), s, 0, 1.0)
-        f1, f2 = 0.0, 0.0
-        if kind == ROTATION:
-            fun = term[k, T.TERM_FUNCTION]
-            f, f1, f2 = fval[fun, 0], fval[fun, 1], fval[fun, 2]
-            turned_axes(frame, j, f, s, 0, 12)
-        if kind == ANGLE:
-            # the angle's rate is a ratio, so its second derivative follows from those of sine and cosine
-            sn = dot3(frame[i], a, frame[j], a + 3)
-            cn = dot3(frame[i], a, frame[j], a)
-            copy3(frame[j], a + 3, s, 0, 1.0)
-            sn1, sn2 = product_rates(frame[i], a, kin[bi], kin[bj], s)
-            copy3(frame[j], a, s, 0, 1.0)
-            cn1, cn2 = product_rates(frame[i], a, kin[bi], kin[bj], s)
-            rho = cn * cn + sn * sn
-            rate = (cn * sn1 - sn * cn1) / rho
-            return (cn * sn2 - sn * cn2) / rho - rate * 2.0 * (cn * cn1 + sn * sn1) / rho
-        _, second = product_rates(frame[i], a, kin[bi], kin[bj], s)
-        if kind == ROTATION:
-            # b = n(t) on J: b'' has f'' n~ - f'^2 n besides the rigid part, and 2 f' w_J x n~
-            cross3(kin[bi], KIN_W, frame[i], a, s, 3)
-            cross3(kin[bj], KIN_W, s, 12, s, 6)
-            second += (
-                f2 * dot3(frame[i], a, s, 12)
-                - f1 * f1 * dot3(frame[i], a, s, 0)
-                + 2.0 * f1 * (dot3(s, 3, s, 12) + dot3(frame[i], a, s, 6))
-            )
-        return second
-    rate_i, bent_i = point_motion(vector(kin[bi], KIN_V), vector(kin[bi], KIN_W), vector(frame[i], T.MK_ARM))
-    rate_j, bent_j = point_motion(vector(kin[bj], KIN_V), vector(kin[bj], KIN_W), vector(frame[j], T.MK_ARM))
-    for c in range(3):
-        s[c], s[3 + c] = rate_i[c] - rate_j[c], bent_i[c] - bent_j[c]
     if kind == POINT:
-        return s[3 + term[k, T.TERM_AXES]]
-    separation(kin, frame, bi, bj, i, j, s, 6)
+        relative_motion(i, j, marker_body, kin, frame, s)
+        return s[QUADRATIC + term[k, T.TERM_AXES]]
+    if kind == DOT1:
+        return dot_motion(k, term, marker_body, kin, frame, s)[2]
+    if kind == ROTATION:
+        f = fval[term[k, T.TERM_FUNCTION]]
+        return D.rotation_bent(frame[i], frame[j], f[0], f[1], f[2], kin[bi], kin[bj])
+    if kind == ANGLE:
+        return D.angle_bent(frame[i], frame[j], kin[bi], kin[bj])
+    separation(kin, frame, bi, bj, i, j, s, 0)
     if kind == DOT2:
-        b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
-        cross3(kin[bj], KIN_W, frame[j], b, s, 9)
-        cross3(kin[bj], KIN_W, s, 9, s, 12)
-        return dot3(frame[j], b, s, 3) + 2.0 * dot3(s, 9, s, 0) + dot3(s, 12, s, 6)
-    length = np.sqrt(dot3(s, 6, s, 6))
-    rate = dot3(s, 6, s, 0) / length
-    return (dot3(s, 0, s, 0) - rate * rate + dot3(s, 6, s, 3)) / length
+        return D.offset_bent(frame[i], frame[j], axes_of(term, k)[1], s, kin[bi], kin[bj])
+    return D.distance_bent(frame[i], frame[j], s, kin[bi], kin[bj])
+
+
+@njit(cache=True, error_model="numpy")
+def hessian(k, term, fval, marker_body, kin, frame, hess, s):
+    """Write the Hessian of term k over [R_I, theta_I, R_J, theta_J] to ``hess``.
+
+    Parameters
+    ----------
+    k : int
+        Number of the term.
+    term : ndarray of int, shape (terms, TERM_COLUMNS)
+    fval : ndarray, shape (functions, 3)
+        Functions of time with two derivatives.
+    marker_body : ndarray of int
+        Body of each marker.
+    kin, frame : ndarray
+        Kinematics of the bodies and frames of the markers, up to date.
+    hess : ndarray, shape (12, 12)
+        Receives the result.
+    s : ndarray
+        Scratch.
+    """
+    kind = term[k, T.TERM_TYPE]
+    i, j = term[k, T.TERM_I], term[k, T.TERM_J]
+    bi, bj = marker_body[i], marker_body[j]
+    ki, kj = kin[bi], kin[bj]
+    for r in range(12):
+        for c in range(12):
+            hess[r, c] = 0.0
+    if kind == POINT:
+        c = term[k, T.TERM_AXES]
+        D.point_curves(c, (c + 1) % 3, (c + 2) % 3, frame[i], frame[j], ki, kj, hess)
+        return
+    if kind == DOT1 or kind == ROTATION:
+        a, b = axes_of(term, k)
+        second = frame[j]
+        if kind == ROTATION:
+            a, b, second = T.MK_AXES, 0, s
+            turned_axis(frame, j, fval[term[k, T.TERM_FUNCTION], 0], s, 0)
+        D.dot_curves(frame[i], a, second, b, ki, kj, hess)
+        return
+    if kind == ANGLE:
+        D.angle_curves(frame[i], frame[j], ki, kj, hess)
+    else:
+        separation(kin, frame, bi, bj, i, j, s, 0)
+        if kind == DOT2:
+            D.offset_curves(frame[i], frame[j], axes_of(term, k)[1], s, ki, kj, hess)
+        else:
+            D.distance_curves(frame[i], frame[j], s, ki, kj, hess)
+    for r in range(12):
+        for c in range(r):
+            hess[r, c] = hess[c, r]
 
 
 # The two commonest constraint terms, POINT and DOT1, without the general path above: their motion,
@@ -319,15 +254,15 @@ def relative_motion(i, j, marker_body, kin, frame, out):
                 out[OFFSET + c] += sign * arm[c]
             continue
         row = kin[body]
-        rate, bent = point_motion(vector(row, KIN_V), vector(row, KIN_W), vector(arm, T.MK_ARM))
+        v0, v1, v2, b0, b1, b2 = D.point_motion(vector(row, KIN_V), vector(row, KIN_W), vector(arm, T.MK_ARM))
         for c in range(3):
             out[OFFSET + c] += sign * (row[KIN_R + c] + arm[c])
-        out[RATE] += sign * rate[0]
-        out[RATE + 1] += sign * rate[1]
-        out[RATE + 2] += sign * rate[2]
-        out[QUADRATIC] += sign * bent[0]
-        out[QUADRATIC + 1] += sign * bent[1]
-        out[QUADRATIC + 2] += sign * bent[2]
+        out[RATE] += sign * v0
+        out[RATE + 1] += sign * v1
+        out[RATE + 2] += sign * v2
+        out[QUADRATIC] += sign * b0
+        out[QUADRATIC + 1] += sign * b1
+        out[QUADRATIC + 2] += sign * b2
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -338,13 +273,12 @@ def dot_motion(k, term, marker_body, kin, frame, s):
     """
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
     bi, bj = marker_body[i], marker_body[j]
-    a = vector(frame[i], T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3))
-    b = vector(frame[j], T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3))
+    at_a, at_b = axes_of(term, k)
+    a, b, w = vector(frame[i], at_a), vector(frame[j], at_b), vector(kin[bi], KIN_W)
     if bj == 0:
-        phi, rate, bent, cross = product_with_fixed(a, b, vector(kin[bi], KIN_W))
+        phi, rate, bent, s[0], s[1], s[2] = D.dot_with_fixed(a, b, w)
     else:
-        phi, rate, bent, cross = product_motion(a, b, vector(kin[bi], KIN_W), vector(kin[bj], KIN_W))
-    s[0], s[1], s[2] = cross
+        phi, rate, bent, s[0], s[1], s[2] = D.dot_motion(a, b, w, vector(kin[bj], KIN_W))
     return phi, rate, bent
 
 
@@ -405,8 +339,7 @@ def add_dot_term(k, coef, lam, mu, term, marker_body, kin, frame, s):
         Scratch of 3 places.
     """
     i, j = term[k, T.TERM_I], term[k, T.TERM_J]
-    a = T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3)
-    b = T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
+    a, b = axes_of(term, k)
     cross3(frame[i], a, frame[j], b, s, 0)
     rate = 0.0
     for side in range(2):

@@ -8,7 +8,7 @@ import numpy as np
 from gearmbs.kernels.jit import njit
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def along_slopes(arm_i, arm_j, vector, axis, i_body, j_body, k_body, out):
     """Write the gradient."""
     arm_ix, arm_iy, arm_iz, arm_jx, arm_jy, arm_jz, x, y = arm_i[0], arm_i[1], arm_i[2], arm_j[0], arm_j[1], arm_j[2], vector[0], vector[1]
@@ -39,7 +39,7 @@ def along_slopes(arm_i, arm_j, vector, axis, i_body, j_body, k_body, out):
     out[14] = x * (e_z * k_2y - (e_y * k_2z)) + y * (e_x * k_2z - (e_z * k_2x)) + z * (e_y * k_2x - (e_x * k_2y))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def along_curves(arm_i, arm_j, vector, axis, i_body, j_body, k_body, out):
     """Write half the Hessian where it is not zero."""
     arm_ix, arm_iy, arm_iz, arm_jx, arm_jy, arm_jz, x, y = arm_i[0], arm_i[1], arm_i[2], arm_j[0], arm_j[1], arm_j[2], vector[0], vector[1]
@@ -130,7 +130,7 @@ def along_curves(arm_i, arm_j, vector, axis, i_body, j_body, k_body, out):
     out[14, 14] = x * (k_2y * _8 - (k_2z * _5)) + y * (k_2z * _2 - (k_2x * _8)) + z * (k_2x * _5 - (k_2y * _2))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def length_slopes(arm_i, arm_j, vector, i_body, j_body, out):
     """Write the gradient."""
     arm_ix, arm_iy, arm_iz, arm_jx, arm_jy, arm_jz, x, y = arm_i[0], arm_i[1], arm_i[2], arm_j[0], arm_j[1], arm_j[2], vector[0], vector[1]
@@ -161,7 +161,7 @@ def length_slopes(arm_i, arm_j, vector, i_body, j_body, out):
     out[11] = -_9
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def length_curves(arm_i, arm_j, vector, i_body, j_body, out):
     """Write half the Hessian where it is not zero."""
     arm_ix, arm_iy, arm_iz, arm_jx, arm_jy, arm_jz, x, y = arm_i[0], arm_i[1], arm_i[2], arm_j[0], arm_j[1], arm_j[2], vector[0], vector[1]
