@@ -21,7 +21,8 @@ Rolling bearings
     `Bearing`, `RollingBearing`
 Mechanisms
     `Mechanism`, `JointFriction`, `simulate`, `Simulator`, `State`, `static_equilibrium`, `quasi_static`,
-    `linear_modes`, `linearize`, `forward_sensitivities`, `steady_sensitivities`, `Solution`
+    `force_law`, `Wrench`, `choose`, `linear_modes`, `linearize`, `forward_sensitivities`, `steady_sensitivities`,
+    `Solution`
 Differential-algebraic equations
     `solve_dae`, `DAEProblem`, `DAEResult`, `Status`
 Signals

@@ -42,6 +42,9 @@ from .gears import planetary_mechanism as planetary_mechanism
 from .mechanism import JointFriction as JointFriction
 from .mechanism import Mechanism as Mechanism
 from .mechanism import Simulator as Simulator
+from .mechanism import Wrench as Wrench
+from .mechanism import choose as choose
+from .mechanism import force_law as force_law
 from .mechanism import forward_sensitivities as forward_sensitivities
 from .mechanism import linear_modes as linear_modes
 from .mechanism import linearize as linearize

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from gearmbs.kernels import derive
-from gearmbs.kernels.derive import ONE, ZERO, Function, derivative, given, inputs, slopes, tangent
+from gearmbs.kernels.derive import ONE, ZERO, Function, choose, derivative, given, inputs, slopes, tangent
 from tests.jets import jets
+from tests.says import says
 
 
 @pytest.mark.parametrize(("module", "path"), derive.definitions())
@@ -51,17 +52,49 @@ LAWS = {
 def test_first_and_second_derivatives(name):
     law, rng = LAWS[name], np.random.default_rng(3)
     variables = inputs("x y z")
-    # exponents are constants of a law
-    free = variables[:2] if name == "powers" else variables
     value = law(*variables)
-    first = slopes(value, free)
-    kernel = compiled(Function("law", "x, y, z", "", [value, *first, *(s for one in first for s in slopes(one, free))]))
+    first = slopes(value, variables)
+    second = [s for one in first for s in slopes(one, variables)]
+    kernel = compiled(Function("law", "x, y, z", "", [value, *first, *second]))
     for _ in range(5):
         place = rng.uniform(0.5, 2.0, 3)
         exact = law(*jets(place))
-        n = len(free)
-        right = [exact.value, *exact.gradient[:n], *exact.hessian[:n, :n].ravel()]
+        right = [exact.value, *exact.gradient, *exact.hessian.ravel()]
         assert kernel(*place) == pytest.approx(right, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["tan", "tanh", "arctan", "exp", "log"])
+def test_functions_by_complex_steps(name):
+    (x,) = inputs("x")
+    kernel = compiled(Function("law", "x", "", slopes(getattr(np, name)(x * x), [x])))
+    law = getattr(np, name)
+    assert kernel(0.7) == pytest.approx(law((0.7 + 1e-30j) ** 2).imag / 1e-30, rel=1e-13)
+
+
+def test_choices_are_differentiated_on_the_side_that_is_chosen():
+    """Of the other side, where it is no number, nothing is left; at the limit the second side counts."""
+    x, y = inputs("x y")
+    law = choose(x, y, np.sqrt(x - y), 3.0 * y) + np.maximum(x, 1.0) - np.minimum(y, 0.5) + np.abs(y - x)
+    kernel = compiled(Function("law", "x, y", "", [law, *slopes(law, (x, y))]))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        assert kernel(np.float64(2.0), np.float64(1.0)) == pytest.approx((3.5, 0.5 + 1.0 + 1.0, -0.5 - 1.0))
+        assert kernel(np.float64(0.2), np.float64(0.4)) == pytest.approx((2.0, -1.0, 3.0 - 1.0 + 1.0))
+
+
+def test_a_branch_of_python_is_refused():
+    (x,) = inputs("x")
+    for branch in (lambda: x > 0.0, lambda: bool(x), lambda: 1.0 >= x):
+        with pytest.raises(TypeError, match=says("branch", "choose", "maximum")):
+            branch()
+
+
+def test_arrays_of_numbers_have_the_products_of_numpy():
+    a, b = np.array(inputs("a_x a_y a_z")), np.array(inputs("b_x b_y b_z"))
+    two = a[0] * b
+    kernel = compiled(Function("law", "a_x, a_y, a_z, b_x, b_y, b_z", "", [a @ b, *np.cross(a, b), *(two + a - a)]))
+    numbers = np.arange(1.0, 7.0)
+    right = [numbers[:3] @ numbers[3:], *np.cross(numbers[:3], numbers[3:]), *numbers[3:]]
+    assert kernel(*numbers) == pytest.approx(right)
 
 
 def test_what_others_compute_has_the_derivatives_they_give():

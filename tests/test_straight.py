@@ -20,6 +20,7 @@ def everything(x, n, pair, row, matrix, out):
     out[0, n] = _0
     out[0, 0] += _0 * _1
     out[1, 0] -= _1 / pair[1] + np.tanh(x) * np.tan(0.1 * x) - np.arctan(b)
+    out[1, 1] = (np.sqrt(x - c) if x > c else x * c) + (a if b > a else b)
     return _0 - 3, _1, pair[0] ** 1.5
 
 

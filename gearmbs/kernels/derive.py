@@ -10,11 +10,13 @@ what they become, with the compiler's options ``COMPILED`` if it has any:
 
     python -m gearmbs.kernels.derive
 
-writes all such files anew. Branches are not traced: whether bodies touch is asked by whoever calls the kernel.
+writes all such files anew. Of branches only `choose` is traced, with both sides computed: whether bodies touch at all
+is asked by whoever calls the kernel.
 """
 
 from __future__ import annotations
 
+import functools
 import importlib
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,8 +24,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 WIDTH = 110
 """Characters of an expression beyond which a part of it gets a line of its own."""
+BRANCH = "a branch cannot be traced; use gm.choose(a, b, x, y), x where a > b and else y, np.maximum or np.minimum"
 _nodes: dict[tuple, Value] = {}
 _slopes: dict[tuple[Value, Value], Value] = {}
 
@@ -31,10 +36,27 @@ _slopes: dict[tuple[Value, Value], Value] = {}
 class Value:
     """A number that is being written down: an operation on other numbers.
 
-    ``numpy.sqrt(value)`` and other functions of numpy call the method of that name.
+    ``numpy.sqrt(value)`` and other functions of numpy call the method of that name; arrays of numbers are arrays of
+    objects, with the products of numpy.
     """
 
     __slots__ = ("_partials", "name", "operands", "operation", "place")
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **keywords: Any) -> Any:
+        own = {"maximum": larger, "minimum": smaller}.get(ufunc.__name__)
+        if method != "__call__" or keywords:
+            return NotImplemented
+        if own and not any(isinstance(x, np.ndarray) for x in inputs):
+            return own(*inputs)
+        return ufunc(*(_boxed(x) if isinstance(x, Value) else x for x in inputs))
+
+    def __bool__(self) -> bool:
+        raise TypeError(BRANCH)
+
+    def _refused(self, other: Any) -> Any:
+        raise TypeError(BRANCH)
+
+    __lt__ = __le__ = __gt__ = __ge__ = _refused
 
     def __init__(self, operation: str, operands: tuple, name: str = "") -> None:
         self.operation, self.operands, self.name = operation, operands, name
@@ -42,7 +64,7 @@ class Value:
         self._partials: Mapping[Value, Value] = {}
 
     def __add__(self, other: Any) -> Value:
-        other = _value(other)
+        other = value_of(other)
         if other.operation == "-x":
             return self - other.operands[0]
         if self.operation == "-x":
@@ -54,7 +76,7 @@ class Value:
         return _commuting("+", self, other, lambda a, b: a + b)
 
     def __sub__(self, other: Any) -> Value:
-        other = _value(other)
+        other = value_of(other)
         if self is other:
             return ZERO
         if self is ZERO or other is ZERO:
@@ -68,7 +90,7 @@ class Value:
         return _node("-", self, other)
 
     def __mul__(self, other: Any) -> Value:
-        other = _value(other)
+        other = value_of(other)
         if ZERO in (self, other):
             return ZERO
         if ONE in (self, other):
@@ -85,7 +107,7 @@ class Value:
         return _commuting("*", self, other, lambda a, b: a * b)
 
     def __truediv__(self, other: Any) -> Value:
-        other = _value(other)
+        other = value_of(other)
         if other.operation == "number":
             return self * (1.0 / other.operands[0])
         if self.operation == "-x":
@@ -98,7 +120,7 @@ class Value:
         return self.operands[0] if self.operation == "-x" else _node("-x", self)
 
     def __pow__(self, exponent: Any) -> Value:
-        exponent = _value(exponent)
+        exponent = value_of(exponent)
         if exponent.operation != "number":
             # written as a product, whose second factor its slope has, too
             return _node("power", self, _node("**", self, exponent - 1.0), exponent)
@@ -115,17 +137,20 @@ class Value:
         return self + other
 
     def __rsub__(self, other: Any) -> Value:
-        return _value(other) - self
+        return value_of(other) - self
 
     def __rmul__(self, other: Any) -> Value:
         return self * other
 
     def __rtruediv__(self, other: Any) -> Value:
-        return _value(other) / self
+        return value_of(other) / self
 
     def sqrt(self) -> Value:
         squares = _squares(self)
         return _node("norm", *squares) if squares else _node("sqrt", self)
+
+    def __abs__(self) -> Value:
+        return choose(self, 0.0, self, -self)
 
     def sin(self) -> Value:
         return _node("sin", self)
@@ -133,8 +158,23 @@ class Value:
     def cos(self) -> Value:
         return _node("cos", self)
 
+    def tan(self) -> Value:
+        return _node("tan", self)
+
+    def tanh(self) -> Value:
+        return _node("tanh", self)
+
+    def exp(self) -> Value:
+        return _node("exp", self)
+
+    def log(self) -> Value:
+        return _node("log", self)
+
+    def arctan(self) -> Value:
+        return _node("arctan", self)
+
     def arctan2(self, other: Any) -> Value:
-        return _node("arctan2", self, _value(other))
+        return _node("arctan2", self, value_of(other))
 
     def partials(self) -> Iterable[tuple[Value, Value]]:
         """Yield the operands and the derivatives by them."""
@@ -161,10 +201,69 @@ class Value:
             length = (a * a + b * b).sqrt()
             yield from ((a, b / length / length), (b, -(a / length / length)))
         elif kind == "power":
-            yield a, self.operands[2] * b
+            exponent = self.operands[2]
+            yield a, exponent * b
+            if exponent.operation != "number":
+                yield exponent, self * a.log()
         elif kind == "**":
-            # by the base alone: exponents are constants of a law
             yield a, b * (self / a)
+            if b.operation != "number":
+                yield b, self * a.log()
+        elif kind in ONE_OPERAND:
+            yield a, ONE_OPERAND[kind](a, self)
+
+
+def _beside_arrays(operator: Any) -> Any:
+    """Return an operator that leaves products with arrays to these."""
+
+    @functools.wraps(operator)
+    def beside(self: Value, other: Any) -> Any:
+        return NotImplemented if isinstance(other, np.ndarray) else operator(self, other)
+
+    return beside
+
+
+for _name in ("add", "sub", "mul", "truediv", "radd", "rsub", "rmul", "rtruediv"):
+    setattr(Value, f"__{_name}__", _beside_arrays(getattr(Value, f"__{_name}__")))
+
+ONE_OPERAND: dict[str, Any] = {
+    "tan": lambda x, f: 1.0 + f * f,
+    "tanh": lambda x, f: 1.0 - f * f,
+    "exp": lambda x, f: f,
+    "log": lambda x, f: 1.0 / x,
+    "arctan": lambda x, f: 1.0 / (1.0 + x * x),
+}
+"""Derivatives of functions f of x."""
+
+
+def choose(a: Any, b: Any, x: Any, y: Any) -> Any:
+    """Return x where a > b, else y. Both are computed: what is not chosen may be no number.
+
+    Examples
+    --------
+    >>> choose(1.0, 2.0, 10.0, 20.0)
+    20.0
+    """
+    if not any(isinstance(one, Value) for one in (a, b, x, y)):
+        return x if a > b else y
+    values = [value_of(one) for one in (a, b, x, y)]
+    return values[2] if values[2] is values[3] else _node("choose", *values)
+
+
+def larger(a: Any, b: Any) -> Any:
+    """Return the larger of two numbers."""
+    return choose(a, b, a, b)
+
+
+def smaller(a: Any, b: Any) -> Any:
+    """Return the smaller of two numbers."""
+    return choose(a, b, b, a)
+
+
+def _boxed(value: Value) -> Any:
+    box = np.empty((), dtype=object)
+    box[()] = value
+    return box
 
 
 def _node(operation: str, *operands: Any, name: str = "") -> Value:
@@ -178,7 +277,8 @@ def _number(number: float) -> Value:
     return _node("number", float(number))
 
 
-def _value(number: Any) -> Value:
+def value_of(number: Any) -> Value:
+    """Return a number as one that is written down."""
     return number if isinstance(number, Value) else _number(number)
 
 
@@ -219,7 +319,7 @@ def inputs(names: str, array: str = "", first: int | str = 0) -> list[Value]:
 
 def given(value: Value, partials: Mapping[Value, Any]) -> Value:
     """Say what derivatives an argument has, by other values; all else is taken for constant. Return it."""
-    value._partials = {by: _value(slope) for by, slope in partials.items()}
+    value._partials = {by: value_of(slope) for by, slope in partials.items()}
     return value
 
 
@@ -228,8 +328,11 @@ def derivative(value: Value, by: Value) -> Value:
     if value is by:
         return ONE
     if (value, by) not in _slopes:
-        _slopes[value, by] = ZERO
-        total = ZERO
+        _slopes[value, by] = total = ZERO
+        if value.operation == "choose":
+            a, b, x, y = value.operands
+            _slopes[value, by] = choose(a, b, derivative(x, by), derivative(y, by))
+            return _slopes[value, by]
         for operand, slope in value.partials():
             total = total + slope * derivative(operand, by)
         _slopes[value, by] = total
@@ -243,7 +346,7 @@ def slopes(value: Value, by: Iterable[Value]) -> list[Value]:
 
 def tangent(value: Value, rates: Mapping[Value, Any]) -> Value:
     """Return the derivative of a value along rates of what it is made of: by time, or by a parameter."""
-    return product((derivative(value, by) for by in rates), map(_value, rates.values()))
+    return product((derivative(value, by) for by in rates), map(value_of, rates.values()))
 
 
 def product(first: Iterable[Value], second: Iterable[Value]) -> Value:
@@ -277,10 +380,15 @@ class Function:
 
     def source(self, compiled: str = 'error_model="numpy"') -> str:
         """Return the kernel as text, to be compiled with some options."""
-        lines = _Lines([_value(value) for value in (*self.returns, *self.sets.values(), *self.adds.values())])
+        head = f"@njit(cache=True, straight=True, {compiled}, forceinline=True)"
+        return f"{head}\n{self.plain()}"
+
+    def plain(self) -> str:
+        """Return the kernel as text without the decorator."""
+        lines = _Lines([value_of(value) for value in (*self.returns, *self.sets.values(), *self.adds.values())])
         body = [f'    """{self.text}"""', *lines.inputs()]
-        returned = [lines.told(_value(value)) for value in self.returns]
-        written = [f"{place} = {lines.told(_value(value))}" for place, value in self.sets.items()]
+        returned = [lines.told(value_of(value)) for value in self.returns]
+        written = [f"{place} = {lines.told(value_of(value))}" for place, value in self.sets.items()]
         for place, value in self.adds.items():
             if value.operation == "-x":
                 written.append(f"{place} -= {lines.told(value.operands[0])}")
@@ -289,8 +397,7 @@ class Function:
         body += lines.written + ["    " + line for line in written]
         if returned:
             body.append(f"    return {', '.join(returned)}")
-        head = f"@njit(cache=True, straight=True, {compiled}, forceinline=True)"
-        return "\n".join([head, f"def {self.name}({self.arguments}):", *body]) + "\n"
+        return "\n".join([f"def {self.name}({self.arguments}):", *body]) + "\n"
 
 
 class _Lines:
@@ -326,7 +433,9 @@ class _Lines:
             return self.names.get(value) or value.name or repr(value.operands[0])
         parts = [self.told(operand) for operand in value.operands]
         closed = [f"({p})" if re.search(r" [-+*/] |^-", p) and not _whole(p) else p for p in parts]
-        if kind in "+-":
+        if kind == "choose":
+            text = f"({closed[2]} if {closed[0]} > {closed[1]} else {closed[3]})"
+        elif kind in "+-":
             text = f"{parts[0]} {kind} {parts[1] if kind == '+' and parts[1][0] != '-' else closed[1]}"
         elif kind in ("*", "**", "power"):
             sign = "**" if kind == "**" else "*"

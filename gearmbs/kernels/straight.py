@@ -4,8 +4,8 @@ A kernel that follows from a definition is hundreds of sums and products of floa
 line by line, 3 to 8 ms each; here each operation becomes one instruction. The kernel keeps its text, which Python runs
 as well, and is called as any other.
 
-What may stand in one: names, numbers of arrays and tuples, + - * / and powers, functions of `FUNCTIONS`; assignments to
-names and to places of arrays, and a return at the end.
+What may stand in one: names, numbers of arrays and tuples, + - * / and powers, functions of `FUNCTIONS`, ``x if a > b
+else y`` with both sides computed; assignments to names and to places of arrays, and a return at the end.
 """
 
 from __future__ import annotations
@@ -148,6 +148,10 @@ class _Writer:
             return builder.fneg(self.value(node.operand), flags=self.liberties)
         if form is ast.Call:
             return self.call(FUNCTIONS[node.func.attr], [self.value(one) for one in node.args])
+        if form is ast.IfExp:
+            above = [self.value(one) for one in (node.test.left, node.test.comparators[0])]
+            chosen = builder.fcmp_ordered(">", *above, flags=self.liberties)
+            return builder.select(chosen, self.value(node.body), self.value(node.orelse))
         left, right = self.value(node.left), self.value(node.right)
         if isinstance(node.op, ast.Pow):
             return self.call(math.pow, [left, right])

@@ -2,8 +2,11 @@ from gearmbs.dae.equations.loads.forces import Diagnostic as Diagnostic
 from gearmbs.dae.problem import AssemblyError as AssemblyError
 from gearmbs.dae.problem import ModelError as ModelError
 from gearmbs.dae.problem import SingularModelError as SingularModelError
+from gearmbs.kernels.derive import choose as choose
 
 from .forces.friction import JointFriction as JointFriction
+from .forces.laws import Wrench as Wrench
+from .forces.laws import force_law as force_law
 from .load_methods import add_modal_force as add_modal_force
 from .mechanism import Mechanism as Mechanism
 from .parts.bodies import Body as Body

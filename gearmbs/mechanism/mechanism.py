@@ -13,6 +13,7 @@ from gearmbs.dae.model.system import System
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.forces.friction import FrictionForce, add_friction, friction_of
 from gearmbs.mechanism.forces.functions import FunctionForce, function_force
+from gearmbs.mechanism.forces.laws import ForceLaw
 from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.language.user_functions import UserFunction
 from gearmbs.mechanism.load_methods import LoadMethods
@@ -345,7 +346,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
     def force(
         self,
         name: str,
-        kernel: Callable[..., None],
+        kernel: Callable[..., None] | ForceLaw,
         *markers: Marker,
         parameters: Mapping[str, float] | Sequence[float] = (),
         states: Mapping[str, float] | Sequence[str] = (),
@@ -358,7 +359,8 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
 
         Parameters
         ----------
-        kernel : callable
+        kernel : callable or ForceLaw
+            What :func:`gearmbs.force_law` makes of a formula, with its derivatives and energy; or
             ``kernel(t, frames, states, parameters, wrench, rates, diagnostics)``, plain Python that numba compiles, or
             compiled by ``numba.njit`` without a signature. It reads the first four and writes to the others, which are
             zero before, and returns nothing; all in SI and global components:
@@ -377,7 +379,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         *markers : Marker
             One, two or more.
         parameters : mapping or sequence of float
-            In the kernel an array, in the order given.
+            In a kernel an array, in the order given; of a law by name.
         states, algebraic : mapping of str to float
             Own states with their start: z' = rate, or z = rate. Results know them as ``name.state``.
         diagnostics : sequence

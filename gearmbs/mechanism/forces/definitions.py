@@ -35,15 +35,23 @@ def seen_from(d, v, spin):
 
 
 class Frame:
-    """A row of frames: origin, axes, velocities; and its twelve variations."""
+    """A row of frames: origin, axes, velocities; and its twelve variations.
 
-    def __init__(self, row: str, mark: str) -> None:
-        self.origin, self.v, self.w = (
-            inputs(" ".join(f"{mark}_{name}{axis}" for axis in "xyz"), row, first)
-            for name, first in (("p", FRAME_P), ("v", FRAME_V), ("w", FRAME_W))
-        )
+    Parameters
+    ----------
+    row, mark : str
+        Name of the array, and of the numbers.
+    before : str
+        What stands before the place in the row: ``"0, "`` of the first row of a matrix.
+    """
+
+    def __init__(self, row: str, mark: str, before: str = "") -> None:
+        def three(name: str, first: int) -> list[Value]:
+            return inputs(" ".join(f"{mark}_{name}{k}" for k in "xyz"), row, f"{before}{first}" if before else first)
+
+        self.origin, self.v, self.w = three("p", FRAME_P), three("v", FRAME_V), three("w", FRAME_W)
         turn = inputs("turn_x turn_y turn_z")
-        rows = [inputs(" ".join(f"{mark}_{c}{k}" for k in "xyz"), row, FRAME_A + 3 * at) for at, c in enumerate("abc")]
+        rows = [three(name, FRAME_A + 3 * at) for at, name in enumerate("abc")]
         self.axes = [[rows[c][k] for c in range(3)] for k in range(3)]
         for axis in self.axes:
             for c in range(3):

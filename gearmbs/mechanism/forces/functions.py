@@ -26,6 +26,7 @@ from gearmbs.dae.problem import EPS, ModelError
 from gearmbs.kernels.jit import CompilationError, njit
 from gearmbs.kernels.pointers import F8, MAT, VEC, address, caller
 from gearmbs.kernels.structs import matrix_at, vector_at
+from gearmbs.mechanism.forces.laws import LAW_DIAGNOSTICS, Derived, ForceLaw, derive_law
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
 
@@ -70,6 +71,8 @@ class FunctionForce(ForceElement):
         Of the differences: m, rad, m/s, rad/s.
     own_states : tuple of State
     told : tuple of Diagnostic
+    law : Derived, optional
+        Of a force law: its kernels.
     """
 
     all_markers: tuple[Marker, ...]
@@ -79,9 +82,11 @@ class FunctionForce(ForceElement):
     steps: tuple[float, ...]
     own_states: tuple[State, ...] = ()
     told: tuple[Diagnostic, ...] = field(default=())
+    law: Derived | None = None
 
     settled = (
         *ForceElement.settled, "all_markers", "function", "derivatives", "parameters", "steps", "own_states", "told",
+        "law",
     )  # fmt: skip
     kind = "force"
 
@@ -113,6 +118,36 @@ class FunctionForce(ForceElement):
             scratch=FRAME_COLUMNS * n + 2 * len(self.own_states) + len(self.told) + 6 * w,
         )
 
+    def by_parameter(self, name: str, frames: np.ndarray, states: np.ndarray, t: float = 0.0) -> np.ndarray:
+        """Return the exact derivatives of wrench and rates by a parameter of a force law.
+
+        Parameters
+        ----------
+        name : str
+        frames : ndarray, shape (markers, 18)
+            As kernels see them: origin, orientation by rows, velocity, angular velocity.
+        states : ndarray
+        t : float
+            s.
+
+        Returns
+        -------
+        ndarray, shape (6 + states,)
+
+        Raises
+        ------
+        ModelError
+            For a kernel of one's own, and names that the law does not have.
+        """
+        if self.law is None:
+            raise ModelError(f"force '{self.name}': its parameters stand in a kernel; give a gm.force_law instead")
+        names = list(self.law.parameters)
+        if name not in names:
+            raise ModelError(f"force '{self.name}': it has no parameter '{name}'; it has {', '.join(names) or 'none'}")
+        out = np.zeros((6 + len(self.own_states), len(names)))
+        self.law.by_parameters(t, frames, states, self.parameters, out)
+        return out[:, names.index(name)]
+
     def __repr__(self) -> str:
         on = ", ".join(repr(m.name) for m in self.markers)
         return f"FunctionForce({self.name!r} on {on})"
@@ -120,7 +155,7 @@ class FunctionForce(ForceElement):
 
 def function_force(
     name: str,
-    kernel: Callable[..., None],
+    kernel: Callable[..., None] | ForceLaw,
     markers: Sequence[Marker],
     parameters: Any,
     states: Any,
@@ -132,6 +167,12 @@ def function_force(
     """Return a checked force; the arguments are those of :meth:`gearmbs.mechanism.Mechanism.force`."""
 
     label = f"force '{name}'"
+    law = None
+    if isinstance(kernel, ForceLaw):
+        if len(diagnostics) or derivatives is not None or steps:
+            raise ModelError(f"{label}: a law brings its diagnostics and derivatives along; leave out these, and steps")
+        law = derive_law(label, kernel, len(markers), parameters, [*states, *algebraic], len(algebraic))
+        kernel, derivatives, parameters, diagnostics = law.values, law.derivatives, law.parameters, LAW_DIAGNOSTICS
     numbers = _parameters(label, parameters)
     own = [*_states(label, name, states, False), *_states(label, name, algebraic, True)]
     told = tuple(_diagnostic(label, d) for d in diagnostics)
@@ -148,14 +189,22 @@ def function_force(
         markers[0],
         markers[1] if len(markers) > 1 else markers[0],
         tuple(markers),
-        _compiled(label, "kernel", kernel, FUNCTION_SIG, ARGUMENTS),
-        None
-        if derivatives is None
-        else _compiled(label, "derivatives", derivatives, DERIVATIVES_SIG, DERIVATIVE_ARGUMENTS),
+        *(law.compiled(_compile_both) if law else _compile_both(label, kernel, derivatives)),
         numbers,
         _steps(label, steps, frames),
         tuple(own),
         told,
+        law,
+    )
+
+
+def _compile_both(label: str, kernel: Any, derivatives: Any) -> tuple[Any, Any]:
+    """Return kernel and derivatives, compiled, or None."""
+    return (
+        _compiled(label, "kernel", kernel, FUNCTION_SIG, ARGUMENTS),
+        None
+        if derivatives is None
+        else _compiled(label, "derivatives", derivatives, DERIVATIVES_SIG, DERIVATIVE_ARGUMENTS),
     )
 
 
@@ -421,7 +470,7 @@ def check_derivatives(element: ForceElement, made: Compiled) -> None:
         See `compare_derivatives`.
     """
     written = element.derivatives if isinstance(element, FunctionForce) else made.kernel
-    if written is None or written in _TRIED:
+    if written is None or written in _TRIED or getattr(element, "law", None) is not None:
         return
     compare_derivatives(element, made)
     _TRIED.add(written)
