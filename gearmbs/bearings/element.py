@@ -167,7 +167,9 @@ class RollingBearing(ForceElement):
             settings=clearance_setting(self.settings, tables),
         )  # fmt: skip
 
-    def by_parameter(self, name: str, frames: np.ndarray, states: np.ndarray) -> np.ndarray:
+    def by_parameter(
+        self, name: str, frames: np.ndarray, states: np.ndarray | None = None, inputs: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return the exact derivatives of wrench and rates by a number of the settings or of the bearing.
 
         Parameters
@@ -177,8 +179,8 @@ class RollingBearing(ForceElement):
             the bearing such as ``"clearance"`` or ``"pitch_diameter"``.
         frames : ndarray, shape (2, 18)
             Of markers I and J as kernels see them: origin, orientation by rows, velocity, angular velocity.
-        states : ndarray
-            Of the element, see `states`.
+        states, inputs : ndarray, optional
+            Of the element, see `states`, by default zeros; there are no inputs.
 
         Returns
         -------
@@ -212,7 +214,8 @@ class RollingBearing(ForceElement):
         )
         tables, out = self.tables, np.zeros(6 + len(self.states))
         changed, work = reals_by(self.settings, name), np.zeros(scratch(len(tables.spinning)))
-        bearing_force_changed(tables.integers, tables.reals, changed, frames, states, work, out)
+        own = np.zeros(len(self.states)) if states is None else states
+        bearing_force_changed(tables.integers, tables.reals, changed, frames, own, work, out)
         return out
 
     def __repr__(self) -> str:

@@ -381,9 +381,9 @@ class Function:
     def source(self, compiled: str = 'error_model="numpy"') -> str:
         """Return the kernel as text, to be compiled with some options."""
         head = f"@njit(cache=True, straight=True, {compiled}, forceinline=True)"
-        return f"{head}\n{self.plain()}"
+        return f"{head}\n{self.undecorated()}"
 
-    def plain(self) -> str:
+    def undecorated(self) -> str:
         """Return the kernel as text without the decorator."""
         lines = _Lines([value_of(value) for value in (*self.returns, *self.sets.values(), *self.adds.values())])
         body = [f'    """{self.text}"""', *lines.inputs()]

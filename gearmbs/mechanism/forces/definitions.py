@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gearmbs.dae.equations.loads.forces import FRAME_A, FRAME_P, FRAME_V, FRAME_W
-from gearmbs.kernels.derive import ZERO, Function, Value, derivative, given, inputs, product
+from gearmbs.kernels.derive import ZERO, Function, Value, derivative, given, inputs, product, tangent
 
 Vector = Sequence[Value]
 
@@ -70,8 +70,10 @@ LAW = "stiffness damping free preload"
 def line_spring() -> list[Function]:
     i, j = Frame("one", "i"), Frame("two", "j")
     d, u, _ = i.minus(j)
-    force = line_force(d, u, *inputs(LAW, "law"))
-    return kernels("line", "the force of a spring along a line", force, 0, i.variations + j.variations)
+    law = inputs(LAW, "law")
+    force = line_force(d, u, *law)
+    made = kernels("line", "the force of a spring along a line", force, 0, i.variations + j.variations)
+    return [*made, changed("line", "one, two, law", force, 0, law)]
 
 
 def axis_spring() -> list[Function]:
@@ -79,9 +81,20 @@ def axis_spring() -> list[Function]:
     angle, *slopes = inputs("angle angle_x angle_y angle_z")
     turns = i.variations[3:6] + j.variations[3:6]
     given(angle, dict(zip(turns, [*slopes, *(-slope for slope in slopes)])))
-    torque = axis_torque(j.axes[2], i.minus(j)[2], angle, *inputs(LAW, "law"))
-    by = i.variations + j.variations
-    return kernels("axis", "the torque of a spring about an axis", torque, 3, by, "angle", "angle_x, angle_y, angle_z")
+    law = inputs(LAW, "law")
+    torque = axis_torque(j.axes[2], i.minus(j)[2], angle, *law)
+    by, what = i.variations + j.variations, "the torque of a spring about an axis"
+    made = kernels("axis", what, torque, 3, by, "angle", "angle_x, angle_y, angle_z")
+    return [*made, changed("axis", "one, two, law, angle", torque, 3, law)]
+
+
+def changed(name: str, arguments: str, load: Vector, row: int, law: Vector) -> Function:
+    """Return the kernel of the derivative of a load along a change of the numbers of its law."""
+    rates = dict(zip(law, inputs(" ".join(f"d_{one}" for one in LAW.split()), "changed")))
+    sets = placed("out[{}]", row, [tangent(one, rates) for one in load])
+    return Function(
+        f"{name}_changed", f"{arguments}, changed, out", "Write how it changes with its numbers.", sets=sets
+    )
 
 
 def kernels(

@@ -117,6 +117,25 @@ def line_slopes(one, two, law, jac):
 
 
 @njit(cache=True, straight=True, error_model="numpy", forceinline=True)
+def line_changed(one, two, law, changed, out):
+    """Write how it changes with its numbers."""
+    i_px, i_py, i_pz, i_vx, i_vy, i_vz, j_px, j_py = one[0], one[1], one[2], one[12], one[13], one[14], two[0], two[1]
+    j_pz, j_vx, j_vy, j_vz, stiffness, free, d_stiffness, d_damping = two[2], two[12], two[13], two[14], law[0], law[2], changed[0], changed[1]
+    d_free, d_preload = changed[2], changed[3]
+    _0 = i_px - j_px
+    _1 = i_py - j_py
+    _2 = i_pz - j_pz
+    _3 = np.sqrt(_0 * _0 + _1 * _1 + _2 * _2)
+    _4 = 1.0 / _3
+    _5 = stiffness * _4
+    _6 = _4 * (_3 - free)
+    _7 = _4 * ((_0 * (i_vx - j_vx) + _1 * (i_vy - j_vy) + _2 * (i_vz - j_vz)) * _4)
+    out[0] = d_free * (_0 * _5) - (d_stiffness * (_0 * _6) + d_damping * (_0 * _7)) + _0 * _4 * d_preload
+    out[1] = d_free * (_1 * _5) - (d_stiffness * (_1 * _6) + d_damping * (_1 * _7)) + _1 * _4 * d_preload
+    out[2] = d_free * (_2 * _5) - (d_stiffness * (_2 * _6) + d_damping * (_2 * _7)) + _2 * _4 * d_preload
+
+
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def axis_load(one, two, law, angle, wrench):
     """Write the torque of a spring about an axis."""
     i_wx, i_wy, i_wz, j_wx, j_wy, j_wz, j_az, j_bz = one[15], one[16], one[17], two[15], two[16], two[17], two[5], two[8]
@@ -193,6 +212,18 @@ def axis_slopes(one, two, law, angle, angle_x, angle_y, angle_z, jac):
     jac[5, 21] = _22
     jac[5, 22] = _23
     jac[5, 23] = _24
+
+
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
+def axis_changed(one, two, law, angle, changed, out):
+    """Write how it changes with its numbers."""
+    i_wx, i_wy, i_wz, j_wx, j_wy, j_wz, j_az, j_bz = one[15], one[16], one[17], two[15], two[16], two[17], two[5], two[8]
+    j_cz, stiffness, free, d_stiffness, d_damping, d_free, d_preload = two[11], law[0], law[2], changed[0], changed[1], changed[2], changed[3]
+    _0 = angle - free
+    _1 = j_az * (i_wx - j_wx) + j_bz * (i_wy - j_wy) + j_cz * (i_wz - j_wz)
+    out[3] = d_free * (j_az * stiffness) - (d_stiffness * (j_az * _0) + d_damping * (j_az * _1)) + j_az * d_preload
+    out[4] = d_free * (j_bz * stiffness) - (d_stiffness * (j_bz * _0) + d_damping * (j_bz * _1)) + j_bz * d_preload
+    out[5] = d_free * (j_cz * stiffness) - (d_stiffness * (j_cz * _0) + d_damping * (j_cz * _1)) + j_cz * d_preload
 
 
 @njit(cache=True, straight=True, error_model="numpy", forceinline=True)

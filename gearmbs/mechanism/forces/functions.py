@@ -118,26 +118,13 @@ class FunctionForce(ForceElement):
             scratch=FRAME_COLUMNS * n + 2 * len(self.own_states) + len(self.told) + 6 * w,
         )
 
-    def by_parameter(self, name: str, frames: np.ndarray, states: np.ndarray, t: float = 0.0) -> np.ndarray:
+    def by_parameter(
+        self, name: str, frames: np.ndarray, states: np.ndarray | None = None, inputs: np.ndarray | None = None,
+        t: float = 0.0,
+    ) -> np.ndarray:  # fmt: skip
         """Return the exact derivatives of wrench and rates by a parameter of a force law.
 
-        Parameters
-        ----------
-        name : str
-        frames : ndarray, shape (markers, 18)
-            As kernels see them: origin, orientation by rows, velocity, angular velocity.
-        states : ndarray
-        t : float
-            s.
-
-        Returns
-        -------
-        ndarray, shape (6 + states,)
-
-        Raises
-        ------
-        ModelError
-            For a kernel of one's own, and names that the law does not have.
+        Arguments, results and errors are those of `ForceElement.by_parameter`, at a time ``t``, s; there are no inputs.
         """
         if self.law is None:
             raise ModelError(f"force '{self.name}': its parameters stand in a kernel; give a gm.force_law instead")
@@ -145,7 +132,8 @@ class FunctionForce(ForceElement):
         if name not in names:
             raise ModelError(f"force '{self.name}': it has no parameter '{name}'; it has {', '.join(names) or 'none'}")
         out = np.zeros((6 + len(self.own_states), len(names)))
-        self.law.by_parameters(t, frames, states, self.parameters, out)
+        own = np.zeros(len(self.own_states)) if states is None else states
+        self.law.by_parameters(t, frames, own, self.parameters, out)
         return out[:, names.index(name)]
 
     def __repr__(self) -> str:

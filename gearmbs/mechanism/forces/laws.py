@@ -283,7 +283,7 @@ def _matrix(array: str, rows: Sequence[Value], by: Sequence[Value]) -> dict[str,
 
 def _function(name: str, made: Function) -> Callable:
     """Return a written kernel as a function, whose text is found by its file's name."""
-    text, file = made.plain(), f"<law {name} {next(_numbers)}>"
+    text, file = made.undecorated(), f"<law {name} {next(_numbers)}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
     space: dict[str, Any] = {"np": np}
     exec(compile(text, file, "exec"), space)

@@ -15,7 +15,7 @@ the angles counted; rotations are meant to be small, so q' is not the derivative
 from __future__ import annotations
 
 from gearmbs.dae.equations.kinematics import angle_gradient, counted_angle
-from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A
+from gearmbs.dae.equations.loads.forces import CHANGED_SIG, DERIVATIVES, FORCE_SIG, FRAME_A
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.structs import matrix_at
 from gearmbs.mechanism.forces import derived as D
@@ -53,6 +53,15 @@ def line_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rate
         D.line_slopes(one, two, reals, jac)
 
 
+@njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
+def line_spring_changed(ints, reals, changed, frames, states, inputs, work, out):
+    """Write the derivative of the force along a change of the reals; arguments as in `CHANGED_SIG`."""
+    one, two = frames[0], frames[1]
+    if one[0] == two[0] and one[1] == two[1] and one[2] == two[2]:
+        return
+    D.line_changed(one, two, reals, changed, out)
+
+
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def axis_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Write the torque about the z axis of J.
@@ -67,13 +76,33 @@ def axis_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rate
         D.axis_slopes(one, two, reals, angle, work[0], work[1], work[2], jac)
 
 
-@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
-def matrix_force(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Write F and N of a bushing, field or beam.
+@njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
+def axis_spring_changed(ints, reals, changed, frames, states, inputs, work, out):
+    """Write the derivative of the torque along a change of the reals; arguments as in `CHANGED_SIG`."""
+    one, two = frames[0], frames[1]
+    D.axis_changed(one, two, reals, counted_angle(2, one, two, inputs[0]), changed, out)
 
-    Arguments as in `gearmbs.dae.equations.loads.forces`; ``ints`` holds the places of the references
-    of AX, AY and AZ among the inputs, or -1.
-    """
+
+@njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
+def matrix_force_changed(ints, reals, changed, frames, states, inputs, work, out):
+    """Write the derivatives of F and N along a change of the reals; arguments as in `CHANGED_SIG`."""
+    see(ints, reals, frames, inputs, work)
+    for r in range(6):
+        load = changed[MATRIX_PRELOAD + r]
+        for k in range(6):
+            load -= changed[MATRIX_STIFFNESS + 6 * r + k] * work[SHIFT + k]
+            load += reals[MATRIX_STIFFNESS + 6 * r + k] * changed[MATRIX_FREE + k]
+            load -= changed[MATRIX_DAMPING + 6 * r + k] * work[RATE + k]
+        work[LOCAL + r] = load
+    for b in range(0, 6, 3):
+        for c in range(3):
+            for k in range(3):
+                out[b + c] += frames[1, FRAME_A + 3 * c + k] * work[LOCAL + b + k]
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def see(ints, reals, frames, inputs, work):
+    """Write what a bushing, field or beam sees of I: q - free at `SHIFT`, q' at `RATE`."""
     one, two = frames[0], frames[1]
     D.shifts(one, two, work)
     for k in range(3):
@@ -83,6 +112,17 @@ def matrix_force(ints, reals, t, frames, states, inputs, want, work, wrench, rat
             work[SHIFT + 3 + k] = counted_angle(k, one, two, inputs[ints[k]]) - reals[MATRIX_FREE + 3 + k]
     for k in range(6):
         work[RATE + k] = work[SEEN + 3 + k]
+
+
+@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
+def matrix_force(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
+    """Write F and N of a bushing, field or beam.
+
+    Arguments as in `gearmbs.dae.equations.loads.forces`; ``ints`` holds the places of the references
+    of AX, AY and AZ among the inputs, or -1.
+    """
+    one, two = frames[0], frames[1]
+    see(ints, reals, frames, inputs, work)
     for r in range(6):
         load = reals[MATRIX_PRELOAD + r]
         for k in range(6):

@@ -54,11 +54,11 @@ class LineSpring(ForceElement):
     has_torque = False
 
     def compiled(self) -> Compiled:
-        from gearmbs.mechanism.forces.spring_kernel import line_spring
+        from gearmbs.mechanism.forces.spring_kernel import line_spring, line_spring_changed
 
         reals = (self.stiffness, self.damping, self.length, self.preload)
         units = {"stiffness": "N/m", "damping": "N*s/m", "length": "m", "preload": "N"}
-        return Compiled(line_spring, reals=reals, scratch=6, settings=_settings(units))
+        return Compiled(line_spring, reals=reals, scratch=6, settings=_settings(units), changed=line_spring_changed)
 
     def __repr__(self) -> str:
         return (
@@ -94,11 +94,14 @@ class AxisSpring(ForceElement):
     has_force = False
 
     def compiled(self) -> Compiled:
-        from gearmbs.mechanism.forces.spring_kernel import axis_spring
+        from gearmbs.mechanism.forces.spring_kernel import axis_spring, axis_spring_changed
 
         reals = (self.stiffness, self.damping, self.angle, self.preload)
         units = {"stiffness": "N*m/rad", "damping": "N*m*s/rad", "angle": "rad", "preload": "N*m"}
-        return Compiled(axis_spring, reals=reals, angles=((2, self.i, self.j),), scratch=9, settings=_settings(units))
+        return Compiled(
+            axis_spring, reals=reals, angles=((2, self.i, self.j),), scratch=9, settings=_settings(units),
+            changed=axis_spring_changed,
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         return (
@@ -145,14 +148,17 @@ class MatrixForce(ForceElement):
         return any(np.any(part[rows]) for part in (self.stiffness, self.damping, self.preload))
 
     def compiled(self) -> Compiled:
-        from gearmbs.mechanism.forces.spring_kernel import WORK, matrix_force
+        from gearmbs.mechanism.forces.spring_kernel import WORK, matrix_force, matrix_force_changed
 
         # an angle without stiffness is not looked at: it may be undetermined, as AX is when z_I stands across
         used = [axis for axis in range(3) if np.any(self.stiffness[:, 3 + axis])]
         places = [used.index(axis) if axis in used else -1 for axis in range(3)]
         reals = np.concatenate([self.stiffness.ravel(), self.damping.ravel(), self.free, self.preload])
         angles = tuple((axis, self.i, self.j) for axis in used)
-        return Compiled(matrix_force, places, reals, angles=angles, scratch=WORK, settings=self._settings())
+        return Compiled(
+            matrix_force, places, reals, angles=angles, scratch=WORK, settings=self._settings(),
+            changed=matrix_force_changed,
+        )  # fmt: skip
 
     def _settings(self) -> dict[str, Setting]:
         """Return the numbers that have a name of their own."""

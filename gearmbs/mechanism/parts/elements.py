@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, Diagnostic
-from gearmbs.dae.problem import ANY
+from gearmbs.dae.problem import ANY, ModelError
 from gearmbs.dae.problem import NOT_NEGATIVE as NOT_NEGATIVE
 from gearmbs.dae.problem import POSITIVE as POSITIVE
 from gearmbs.dae.problem import Allowed as Allowed
@@ -60,6 +60,8 @@ class Compiled:
         Numbers among ``reals`` that can be changed while a simulation goes on, by the name of what they are.
     given : mapping of str to int
         Which of ``times`` can be changed so, N m; of a STEP what it ends at.
+    changed : compiled function, optional
+        With the signature ``CHANGED_SIG``: derivatives along a change of the reals.
     lean : callable, optional
         Offers a leaner kernel for bodies that turn about fixed axes; see
         `gearmbs.dae.model.builder.TableBuilder.add_element`.
@@ -76,6 +78,7 @@ class Compiled:
     scratch: int = 0
     settings: Mapping[str, Setting] = field(default_factory=dict)
     given: Mapping[str, int] = field(default_factory=dict)
+    changed: Any = None
     lean: Callable[[np.ndarray, np.ndarray], tuple[Any, np.ndarray] | None] | None = None
 
 
@@ -168,6 +171,48 @@ class ForceElement(OwnAttributes):
     @abstractmethod
     def compiled(self) -> Compiled:
         """Return what is handed to the equations; kernels are imported here."""
+
+    def by_parameter(
+        self, name: str, frames: np.ndarray, states: np.ndarray | None = None, inputs: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return the exact derivatives of its wrench and rates by one of its numbers.
+
+        Parameters
+        ----------
+        name : str
+            One that can be changed while a simulation goes on, such as ``"stiffness"``.
+        frames : ndarray, shape (markers, 18)
+            Of the markers that it sees, as kernels do: origin, orientation by rows, velocity, angular velocity.
+        states, inputs : ndarray, optional
+            Its own states; references of the angles that it counts. Default: zeros.
+
+        Returns
+        -------
+        ndarray, shape (6 wrenches + states,)
+            By the number in SI, global components.
+
+        Raises
+        ------
+        ModelError
+            For a name that it does not have, and elements whose derivatives by their numbers are not known.
+        """
+        made = self.compiled()
+        label = f"{self.kind} '{self.name}'"
+        if made.changed is None:
+            raise ModelError(f"{label}: its derivatives by parameters are not known; take differences of two elements")
+        setting = made.settings.get(name)
+        if setting is None:
+            there = ", ".join(made.settings) or "none"
+            raise ModelError(f"{label}: it has no number '{name}' to be differentiated by; there are {there}")
+        reals, changed = np.array(made.reals, dtype=float), np.zeros(len(made.reals))
+        for at, factor, _ in ((setting.at, setting.factor, 0.0), *setting.others):
+            changed[at] = factor
+        own = np.zeros(len(self.states)) if states is None else np.asarray(states, dtype=float)
+        seen = np.zeros(6 * len(made.reactions) + len(made.times) + len(made.angles)) if inputs is None else inputs
+        out = np.zeros(6 * self.wrenches + len(own))
+        integers = np.array(made.integers, dtype=np.int64)
+        made.changed(integers, reals, changed, frames, own, seen, np.zeros(made.scratch), out)
+        return out
 
 
 @dataclass(eq=False, repr=False)

@@ -74,6 +74,13 @@ TURNING_SIG = types.void(IVEC, VEC, VEC, VEC, I8, VEC, VEC, MAT, VEC)
 
 with the element's tables, a table of what its two axes imply, the angles by which I's and J's body have turned and
 their rates. ``slopes``, shape (6, 4), are the wrench's derivatives by these, ``work`` has 36 places."""
+CHANGED_SIG = types.void(IVEC, VEC, VEC, MAT, VEC, VEC, VEC, VEC)
+"""Signature of a kernel of derivatives by numbers of an element,
+
+    kernel(ints, reals, changed, frames, states, inputs, work, out)
+
+with the element's tables and what it sees; ``changed`` is a change of the reals, along which the derivatives of F, N
+and the rates are added to ``out``."""
 LEAN_ADDRESS = 0
 """Address of an element's lean kernel in this process, or 0."""
 LEAN_FIRST = 1

@@ -1,0 +1,104 @@
+"""Relative pose of two wheels, and ends of the face, each stated once; see `gearmbs.kernels.derive`.
+
+Symbols are those of docs/theory/contact.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gearmbs.kernels.derive import Function, Value, derivative, given, inputs, product, slopes
+
+COMPILED = 'error_model="numpy", fastmath={"contract": True, "arcp": True}'
+
+Vector = Sequence[Value]
+
+
+def rates(a, h, p, q, w, twist):
+    """Return x' = (a', h', p', q', phi1', phi2') and the turn of M by the twist of wheel 1 relative to wheel 2.
+
+    M turns with half of it about x and y, less what z turns the tilt by; with what moves the line of centres about z.
+    """
+    rx, ry, rz, ox, oy, oz = twist
+    mx = 0.5 * oy - 0.5 * (oz * q / w)
+    my = 0.5 * (oz * p / w) - 0.5 * ox
+    mz = -((ry + h * my) / a)
+    tilted = p * my - q * mx
+    share = 1.0 / (1.0 + w)
+    own = p * ox + q * oy + w * oz + tilted * (1.0 + 2.0 * w) * share - mz
+    return [-rx - h * mx, a * mx - rz, w * mx + q * mz, w * my - p * mz, own, -(tilted * share) - mz], [-my, mx, mz]
+
+
+def pose() -> list[Function]:
+    """x' is linear in the twist: x' = C t, so that the wrench that does the work of Q is C^T Q."""
+    a, h, p, q = inputs("a h p q", "x")
+    (w,) = inputs("w")
+    given(w, {p: -(p / w), q: -(q / w)})
+    twist = inputs("rx ry rz ox oy oz", "twist")
+    force = inputs("Q_a Q_h Q_p Q_q Q_1 Q_2", "force")
+    x, turn = rates(a, h, p, q, w, twist)
+    columns = [slopes(one, twist) for one in x]
+    turns = [slopes(one, twist) for one in turn]
+    wrench = [product(force, [row[k] for row in columns]) for k in range(6)]
+    pose_of = (a, h, p, q)
+    return [
+        Function("pose_rates", "x, w, twist, xd", "Write the rates of the pose.", sets=vector("xd", x)),
+        Function("pose_rate_slopes", "x, w, twist, xd_x", "Write their derivatives by a, h, p, q.",
+                 sets=matrix("xd_x", [slopes(one, pose_of) for one in x])),
+        Function("pose_wrench", "x, w, force, wrench", "Write the wrench on wheel 1 that does the work of a force.",
+                 sets=vector("wrench", wrench)),
+        Function("pose_wrench_slopes", "x, w, force, wrench_x", "Write its derivatives by a, h, p, q.",
+                 sets=matrix("wrench_x", [slopes(one, pose_of) for one in wrench])),
+        Function("pose_columns", "x, w, columns, turn", "Write the derivatives by the twist of x' and of M's turn.",
+                 sets=matrix("columns", columns) | matrix("turn", turns)),
+    ]  # fmt: skip
+
+
+def vector(name: str, values: Vector) -> dict[str, Value]:
+    return {f"{name}[{k}]": value for k, value in enumerate(values)}
+
+
+def matrix(name: str, values: Sequence[Vector]) -> dict[str, Value]:
+    return {f"{name}[{i}, {k}]": value for i, row in enumerate(values) for k, value in enumerate(row)}
+
+
+def end_of_face(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other):
+    """Return where an end face cuts the path of contact along the mean axis.
+
+    ``width`` is half the width towards the end, ``sign`` 1 for wheel 1 and -1 for wheel 2, whose axis stands at a:
+    ``other`` is 1.
+    """
+    x, y = base * ca + sig * sa, sig * ca - base * sa
+    return (width - sign * (p * x + q * y) - other * (p * a)) * i_w - 0.5 * (sign * h)
+
+
+def ends() -> list[Function]:
+    """cos alpha_0 = r_b/a, length^2 = a^2 - r_b^2, roll sig = (r_b1 f1 - r_b2 f2 + d alpha_0 + length)/2."""
+    a, h, p, q = inputs("a h p q")
+    f1, f2 = inputs("f1 f2")
+    base, mate, total, difference, length = inputs("base mate total difference length")
+    sa, ca, sig, i_w, width, sign, other = inputs("sa ca sig i_w width sign other")
+    i_w3, i_w5 = inputs("i_w3 i_w5")
+    turned = total / (a * length)
+    given(length, {a: a / length})
+    given(sa, {a: ca * turned})
+    given(ca, {a: -(sa * turned)})
+    given(i_w, {p: p * i_w3, q: q * i_w3})
+    given(i_w3, {p: 3.0 * (p * i_w5), q: 3.0 * (q * i_w5)})
+    given(sig, {a: 0.5 * (difference * turned + a / length), f1: 0.5 * base, f2: -0.5 * mate})
+    by = (a, h, p, q, f1, f2)
+    limit = end_of_face(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other)
+    first = slopes(limit, by)
+    second = [[derivative(one, x) for x in by] for one in first]
+    numbers = "a, h, p, q, base, sa, ca, sig, i_w, width, sign, other"
+    more = f"{numbers}, mate, total, difference, length, i_w3"
+    halves = {f"hess[{i}, {k}]": second[i][k] for i in range(6) for k in range(i, 6)}
+    return [
+        Function("end_value", numbers, "Return where an end face cuts the path of contact.", [limit]),
+        Function("end_slopes", f"{more}, grad", "Write its gradient by the pose.", sets=vector("grad", first)),
+        Function("end_curves", f"{more}, i_w5, hess", "Write the upper half of its Hessian.", sets=halves),
+    ]
+
+
+def functions() -> list[Function]:
+    return [*pose(), *ends()]
