@@ -55,7 +55,10 @@ def line_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rate
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def line_spring_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write the derivative of the force along a change of the reals; arguments as in `CHANGED_SIG`."""
+    """Write the derivative of the force along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     one, two = frames[0], frames[1]
     if one[0] == two[0] and one[1] == two[1] and one[2] == two[2]:
         return
@@ -78,14 +81,20 @@ def axis_spring(ints, reals, t, frames, states, inputs, want, work, wrench, rate
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def axis_spring_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write the derivative of the torque along a change of the reals; arguments as in `CHANGED_SIG`."""
+    """Write the derivative of the torque along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     one, two = frames[0], frames[1]
     D.axis_changed(one, two, reals, counted_angle(2, one, two, inputs[0]), changed, out)
 
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def matrix_force_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write the derivatives of F and N along a change of the reals; arguments as in `CHANGED_SIG`."""
+    """Write the derivatives of F and N along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     see(ints, reals, frames, inputs, work)
     for r in range(6):
         load = changed[MATRIX_PRELOAD + r]
