@@ -15,6 +15,7 @@ import pytest
 import gearmbs
 from gearmbs.bearings import Bearing, RollingBearing
 from gearmbs.bearings.clearance import ClearanceForce
+from gearmbs.drivetrain.couplings.even_twist import EvenTwist
 from gearmbs.drivetrain.torque_element import ACCOUNTS, ShaftTorque
 from gearmbs.flexible import BeamSection, LargeBeam
 from gearmbs.gears import ElasticRim, GearPair, IdealMesh, planetary_mechanism
@@ -88,6 +89,7 @@ ELEMENTS = {
         lambda m, i, j: m.bushing("x", i, j, stiffness=(10, 20, 30), damping=(1, 2, 3), torsional_stiffness=(4, 5, 6))
     ),
     "ClearanceForce": between(lambda m, i, j: m.add(ClearanceForce("x", i, j, (1e-4, 1e7, 1.5, 50.0, 1e-3)))),
+    "EvenTwist": between(lambda m, i, j: m.add(EvenTwist("x", i, j, (40.0, 3.0, 7.0, 0.5)))),
     "Field": between(lambda m, i, j: m.field("x", i, j, stiffness=FULL, damping=0.1 * FULL, free=range(6))),
     "FrictionForce": between(friction),
     "FunctionForce": between(
