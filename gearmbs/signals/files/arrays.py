@@ -17,6 +17,7 @@ import xarray as xr
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.named_arrays import assemble
+from gearmbs.signals.files.scales import CHECK, FACTORS
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
 from gearmbs.signals.signal.labels import is_clock
 from gearmbs.signals.signal.record import (
@@ -35,8 +36,6 @@ MAGIC = b"\x89HDF\r\n\x1a\n"
 NAMELESS = frozenset(("data", "value", "values", "samples", "signal", "y"))
 """Datasets of one channel that are named by their groups."""
 SCALED = frozenset(("scale_factor", "add_offset"))
-FACTORS = frozenset("scale offset gain slope intercept sensitivity calibration factor lsb resolution".split())
-"""Attributes by which counts of a converter may have to be multiplied, divided or shifted."""
 COLUMN_NAMES = frozenset("channels channel_names channelnames names columns column_names labels".split())
 USER_BLOCK = 512
 """Bytes that MATLAB 7.3 puts before the HDF5 data."""
@@ -205,7 +204,7 @@ def _scaled(item: Any, notes: list[str]) -> np.ndarray:
     if factors and values.dtype.kind in "iu":
         listed = ", ".join(f"{name} = {attrs[name]}" for name in factors)
         notes.append(
-            f"CHECK THE SCALE: {item.name} holds whole numbers and the attributes {listed}, which are not applied, for "
+            f"{CHECK}{item.name} holds whole numbers and the attributes {listed}, which are not applied, for "
             "nothing says how; write scale_factor and add_offset, as NetCDF has them, or scale the samples yourself."
         )
     return values

@@ -25,6 +25,7 @@ from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.labview import read_lvm
 from gearmbs.signals.files.own_clocks import on_one_clock, own_clocks
+from gearmbs.signals.files.scales import named_factors, scale_told
 from gearmbs.signals.files.scopes import scope_layout
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
 from gearmbs.signals.files.text_tables import (
@@ -399,6 +400,9 @@ def _record(
     if not kept:
         raise SignalFileError(path, f"holds no column of samples beside {layout.names}")
     attrs = layout.meta.get("attrs", {})
+    factors = named_factors(layout.meta) if COUNT not in layout.meta else {}
+    scales = [scale_told(layout.names[i], layout.units[i], values[:, i], factors) for i in kept]
+    notes += [words for words in scales if words is not None]
     return Record(
         values if len(kept) == values.shape[1] else values[:, kept],
         [layout.names[i] for i in kept],

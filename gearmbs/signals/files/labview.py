@@ -16,10 +16,12 @@ from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.table import Content, Format, begins_with
 from gearmbs.signals.files.text_tables import decoded
-from gearmbs.signals.signal.labels import SLOW_ROLES, SLOW_SAID, role_of
+from gearmbs.signals.signal.labels import SLOW_ROLES, SLOW_SAID, role_of, tells_time
 from gearmbs.signals.signal.record import (
+    RateCandidate,
     Record,
     chosen_rate,
+    rate_by_times,
     rate_candidates,
     rate_from_times,
     same_rate,
@@ -27,6 +29,7 @@ from gearmbs.signals.signal.record import (
     speed_of,
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
+from gearmbs.signals.signal.times import in_seconds
 
 END = "***End_of_Header***"
 SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
@@ -187,11 +190,14 @@ def _read(
     try:
         with open(path, "rb") as raw, nptdms.TdmsFile.open(raw) as file:
             kept, names = _chosen(path, file, channels)
+            own = "attrs" in file.properties and "sampling_rate" in file.properties
+            found = {} if own else {name: _own_times(file, c) for name, c in zip(names, kept, strict=True)}
+            clocks = {name: times for name, times in found.items() if times is not None}
             count = max(len(c) for c in kept)
             for start in range(0, count, block or count):
                 stop = min(start + (block or count), count)
                 values = np.stack([_stretch(c, start, stop, count) for c in kept], axis=1)
-                yield _record(path, values, kept, names, file, rate), stop / count
+                yield _record(path, values, kept, names, file, rate, clocks), stop / count
     except SignalFileError:
         raise
     except Exception as exc:
@@ -222,6 +228,7 @@ def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list
         raise SignalFileError(
             path, f"holds no samples over time{'' if channels is None else f' in {list(channels)}'}{listed}"
         )
+    kept = [(name, c) for name, c in kept if name in (channels or ()) or not _holds_times(c)] or kept
     longest = max(len(c) for _, c in kept)
     if any(len(c) < longest and not _is_slow(c) for _, c in kept):
         listed = ", ".join(f"{name} ({len(c)})" for name, c in kept)
@@ -238,6 +245,20 @@ def _unit_of(channel: Any) -> str:
     """Return the unit of a channel, under either name that LabVIEW writes."""
     told = (str(channel.properties.get(name) or "").strip() for name in ("unit_string", "NI_UnitDescription"))
     return next(filter(None, told), UNKNOWN_UNITS)
+
+
+def _holds_times(channel: Any) -> bool:
+    """Return whether a channel holds the times of the others of its group."""
+    return channel.dtype.kind == "M" or tells_time(channel.name, _unit_of(channel))
+
+
+def _own_times(file: Any, channel: Any) -> np.ndarray | None:
+    """Return the times (s) that a channel of the same group and length holds, or None."""
+    group = file[channel.group_name].channels()
+    clock = next((c for c in group if len(c) == len(channel) > 1 and c is not channel and _holds_times(c)), None)
+    if clock is None or clock.dtype.kind not in "Mfiu" or _holds_times(channel):
+        return None
+    return in_seconds(np.asarray(clock[:]), _unit_of(clock), clock.name)
 
 
 def _is_slow(channel: Any) -> bool:
@@ -261,7 +282,13 @@ def _stretch(channel: Any, start: int, stop: int, count: int) -> np.ndarray:
 
 
 def _record(
-    path: Path, values: np.ndarray, kept: Sequence[Any], names: list[str], file: Any, given: float | None
+    path: Path,
+    values: np.ndarray,
+    kept: Sequence[Any],
+    names: list[str],
+    file: Any,
+    given: float | None,
+    clocks: dict[str, np.ndarray],
 ) -> Record:
     root = dict(file.properties)
     notes: list[str] = []
@@ -279,10 +306,18 @@ def _record(
         if name in slow:
             continue
         rates[name], said = _rate(path, file, channel, root, given)
+        if name in clocks:
+            known = rates[name]
+            by_times = rate_by_times(clocks[name], path, given, others=known is not None)
+            own = [] if known is None else [RateCandidate(f"the rate of {name}", known)]
+            own += [] if by_times is None else [RateCandidate("its channel of times", by_times)]
+            rates[name], more = chosen_rate(path, own, given)
+            said = [*said, *more]
         notes += [note for note in said if note not in notes]
     rate = same_rate(path, rates)
-    if starts:
-        same_start(path, starts, rate)
+    begins = {name: float(clocks[name][0]) for name in names if name in clocks and name not in slow}
+    for begin in (starts, begins):
+        same_start(path, begin, rate)
     if speed is None:
         speed, said = speed_of({**root, **dict(file[kept[0].group_name].properties)})
         notes += said
@@ -292,7 +327,7 @@ def _record(
         list(names),
         [_unit_of(c) for c in kept],
         rate,
-        float(kept[0].properties.get("wf_start_offset", 0.0)),
+        float(kept[0].properties.get("wf_start_offset", begins.get(names[0], 0.0))),
         speed,
         None if teeth is None else check_teeth(json.loads(str(teeth))),
         json.loads(root.get("attrs", "{}")),

@@ -10,10 +10,13 @@ import numpy as np
 
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.own_clocks import checked_same, interpolated
+from gearmbs.signals.files.scales import named_factors, scale_told
 from gearmbs.signals.signal.labels import (
     CLOCK_NAMES,
     SLOW_ROLES,
     SLOW_SAID,
+    is_clock,
+    key_of,
     may_be_times,
     rises_evenly,
     role_of,
@@ -35,7 +38,10 @@ from gearmbs.signals.signal.record import (
     speed_of,
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
-from gearmbs.signals.signal.times import in_seconds
+from gearmbs.signals.signal.times import in_seconds, seconds_of
+
+OF_TIMES = ("timeunit", "timeunits", "unittime", "unitoftime", "tunit", "tunits", "xunit", "xunits", "zeiteinheit")
+"""Names of texts that tell the unit of times beside them."""
 
 
 def assemble(
@@ -56,6 +62,7 @@ def assemble(
     arrays, by default what stands before the last dot of their names: times beside an array are its own.
     """
     homes = {} if homes is None else homes
+    units = _units_of_times(arrays, scalars, units, homes)
     told = {k: units.get(k, UNKNOWN_UNITS) for k in arrays}
     clocks = _clocks(arrays, told, homes, channels)
     columns: dict[str, np.ndarray] = {}
@@ -90,6 +97,10 @@ def assemble(
         times = _clock_of(path, name, _own_times(key, columns[name].size, clocks, homes), given)
         if times is not None and times.dtype.kind in "fiu":
             own[name] = times
+    for name, key in owner.items():
+        factors = named_factors(_beside(scalars, key, homes), words_of(_bare(key, homes)))
+        scaled = scale_told(name, column_units[name], columns[name], factors)
+        notes += [] if scaled is None else [scaled]
     slow, said = _slow_ones_stretched(path, columns, column_units, own)
     notes += said
     lengths = {name: column.size for name, column in columns.items()}
@@ -156,6 +167,34 @@ def _clocks(
     for key in sorted(named):
         begin[units[key]] = min(begin.get(units[key], np.inf), float(flat[key][0]))
     return {key: in_seconds(flat[key], units[key], last[key], begin[units[key]]) for key in flat if key in named}
+
+
+def _beside(scalars: Mapping[str, Any], key: str, homes: Mapping[str, str]) -> dict[str, Any]:
+    """Return what stands beside an array or above it."""
+    home = f"{homes.get(key, key.rpartition('.')[0])}."
+    return {
+        name: value
+        for name, value in scalars.items()
+        if home.startswith(f"{name.rpartition('.')[0]}.") or "." not in name
+    }
+
+
+def _units_of_times(
+    arrays: Mapping[str, np.ndarray], scalars: Mapping[str, Any], units: Mapping[str, str], homes: Mapping[str, str]
+) -> dict[str, str]:
+    """Return the units of arrays; those of times as TimeUnit beside them says, and none that is of no time."""
+    found = dict(units)
+    for key in arrays:
+        if not is_clock(_bare(key, homes)):
+            continue
+        beside = {key_of(name)[0]: str(value) for name, value in _beside(scalars, key, homes).items()}
+        named = next((beside[name] for name in OF_TIMES if name in beside), None)
+        if named is not None and seconds_of(named) is not None:
+            found[key] = named
+        elif seconds_of(found.get(key, "")) is None and any(found.get(k) == found[key] for k in arrays if k != key):
+            # that of its group, which means the samples
+            found[key] = UNKNOWN_UNITS
+    return found
 
 
 def _bare(key: str, homes: Mapping[str, str]) -> str:
