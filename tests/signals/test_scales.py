@@ -61,6 +61,10 @@ def test_counts_and_volts_beside_a_factor_are_told_in_text(tmp_path):
     signal = text(tmp_path / "a.csv", ["Scale: 0.001 g/count", rate, "ch1"], COUNTS)
     assert told(signal, "CHECK THE SCALE", "ch1", "Scale = 0.001 g/count")
     assert told(text(tmp_path / "b.csv", ["# sensitivity = 100 mV/g", f"# {rate}", "vib [mV]"], 0.1 * A), "vib", "mV")
+    both = ["# Sensitivity CH1: 100 mV/g", "# Sensitivity CH2: 10 mV/g", f"# {rate}", "CH1 [mV]"]
+    alone = text(tmp_path / "s.csv", both, 0.1 * A)
+    assert told(alone, "CHECK THE SCALE", "Sensitivity CH1 = 100 mV/g")
+    assert not told(alone, "CH2")
     assert told(text(tmp_path / "c.csv", ["Skalierung: 0.001", rate, "a"], COUNTS), "Skalierung")
     assert not told(text(tmp_path / "d.csv", ["Scale: 0.001 g/count", rate, "a [g]"], A), "CHECK THE SCALE")
     assert not told(text(tmp_path / "e.csv", ["Vertical Scale: 0.2", rate, "a"], COUNTS), "CHECK THE SCALE")

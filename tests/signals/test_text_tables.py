@@ -79,6 +79,8 @@ TWO = ["X,CH1,CH2,Start,Increment,", "Sequence,Volt,Volt,-1.0e-02,1.0e-04"]
 
 @pytest.mark.parametrize(("head", "row", "channels"), [
     (["X,CH1,Start,Increment,", "Sequence,Volt,-1.0e-02,1.0e-04"], lambda i: f"{i},{A[i]},,", ["CH1"]),
+    (["X,CH1,D7-D0,D15-D8,Start,Increment,", "Sequence,Volt,,,-1.0e-02,1.0e-04"], lambda i: f"{i},{A[i]},0x00,0x1F,",
+     ["CH1"]),
     (TWO, lambda i: f"{i},{A[i]},{-A[i]},,", ["CH1", "CH2"]),
     (["CH1(V),CH2(V),t0 = -0.01, tInc = 1e-04,"], lambda i: f"{A[i]},{-A[i]},,,", ["CH1", "CH2"]),
     (["Time(s),CH1(V),t0 = -0.01, tInc = 1e-04,"], lambda i: f"{TIME[i] - 0.01:.6e},{A[i]},,", ["CH1"]),

@@ -12,7 +12,7 @@ import io
 import json
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +23,8 @@ import pandas as pd
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalError, SignalFileError
+from gearmbs.signals.files.cells import MINUS, WITHOUT, between_thousands, thousands_column, with_minus
+from gearmbs.signals.files.encodings import encoding_of, utf16_without_mark
 from gearmbs.signals.files.labview import read_lvm
 from gearmbs.signals.files.own_clocks import on_one_clock, own_clocks
 from gearmbs.signals.files.scales import named_factors, scale_told
@@ -37,13 +39,12 @@ from gearmbs.signals.files.text_tables import (
     CsvLayout,
     Times,
     cell_kind,
-    encoding_of,
     find_layout,
     index_meaning,
     pointed,
     split_cells,
 )
-from gearmbs.signals.signal.labels import FEWEST_EVEN, rises_evenly, role_of
+from gearmbs.signals.signal.labels import FEWEST_EVEN, rises_evenly, role_of, words_of
 from gearmbs.signals.signal.record import (
     REMEDY,
     Progress,
@@ -196,7 +197,7 @@ def _written(cell: str) -> tuple[int, int] | None:
 
 
 def csv_pieces(
-    path: Path, packed: bool, rate: float | None = None, gaps: str | None = None
+    path: Path, packed: bool, rate: float | None, gaps: str | None, layout: CsvLayout
 ) -> Iterator[tuple[Record, float]]:
     """Read a text table block by block: records in their order, each with the fraction read by then.
 
@@ -206,7 +207,6 @@ def csv_pieces(
         As `read_csv`, and if the times of a block do not go on where the last one ended.
     """
     with _damage_named(path):
-        layout = _layout(path, packed)
         times, first, count = Times(layout, path), None, 0
         for values, stamped, fraction in _blocks(path, packed, layout, gaps):
             clock = times.seconds(values, stamped)
@@ -285,25 +285,59 @@ def _layout(path: Path, packed: bool, pulses: bool = False) -> CsvLayout:
         head = [line for line, _ in zip(text, range(HEAD_LINES))]
     if any("\x00" in line for line in head):
         raise SignalFileError(path, "holds binary data, not text; is it in another format?")
+    printed = _holds_printed_minus(path, packed)
+    head = list(map(with_minus, head)) if printed else head
     layout = scope_layout(head) or find_layout(head, path)
+    layout = replace(layout, printed=True) if printed else layout
+    rows = [split_cells(line, layout.separator) for line in head[layout.first :] if not COMMENT.match(line)]
+    threes = None if layout.halves else thousands_column(rows, layout.names, layout.decimal)
+    if threes is not None:
+        raise SignalFileError(
+            path,
+            f"{threes[0]!r} holds {threes[1]!r} beside numbers below 1000 without {layout.decimal!r}, which looks like "
+            f"one between thousands; {WITHOUT}, or all of them with the same decimals",
+        )
     groups = () if pulses or layout.stamps else own_clocks(layout.names, layout.units)
     clocks = [clock for clock, _ in groups]
     return replace(layout, groups=groups, index=None if layout.index in clocks else layout.index)
 
 
-class _Pointed(io.TextIOBase):
-    """A text whose rows have decimal points for each second comma."""
+class _Rewritten(io.TextIOBase):
+    """A text whose lines are written anew."""
 
-    def __init__(self, text: io.TextIOBase) -> None:
-        self.text, self.rest = text, ""
+    def __init__(self, text: io.TextIOBase, written: Callable[[str], str]) -> None:
+        self.text, self.written, self.rest = text, written, ""
 
     def read(self, size: int | None = -1) -> str:
         """Return so many characters of the rows, as whole rows where they are longer; all that are left of -1."""
         lines = self.text.readlines(-1 if size is None or size < 0 else size)
-        self.rest += "".join(map(pointed, lines))
+        self.rest += "".join(map(self.written, lines))
         taken = self.rest if size is None or size < 0 else self.rest[:size]
         self.rest = self.rest[len(taken) :]
         return taken
+
+
+def _with_plain_numbers(layout: CsvLayout) -> Callable[[str], str]:
+    """Return what makes numbers as Python has them of a line."""
+    signed = with_minus if layout.printed else str
+    return (lambda line: pointed(signed(line))) if layout.halves else signed
+
+
+def _holds_printed_minus(path: Path, packed: bool) -> bool:
+    """Return whether a text holds one of the signs that are printed for a minus."""
+    with open(path, "rb") as raw:
+        stream: IO[bytes] = gzip.GzipFile(fileobj=raw) if packed else raw  # type: ignore[assignment]
+        piece = stream.read(TAIL_READ)
+        encoding = encoding_of(piece[: 1 << 16])
+        if encoding in ("utf-16", "utf-32"):
+            encoding += "-le" if piece[:1] == b"\xff" else "-be"
+        signs = [sign.encode(encoding, errors="ignore") for sign in MINUS]
+        while piece:
+            if any(sign and sign in piece for sign in signs):
+                return True
+            rest = stream.read(TAIL_READ)
+            piece = piece[-4:] + rest if rest else b""
+    return False
 
 
 def _blocks(
@@ -320,7 +354,7 @@ def _blocks(
             for _ in range(first):
                 text.readline()
             table = pd.read_csv(
-                _Pointed(text) if layout.halves else text,
+                _Rewritten(text, _with_plain_numbers(layout)) if layout.halves or layout.printed else text,
                 sep=r"\s+" if separator is None else separator,
                 decimal=layout.decimal,
                 header=None,
@@ -400,8 +434,9 @@ def _record(
     if not kept:
         raise SignalFileError(path, f"holds no column of samples beside {layout.names}")
     attrs = layout.meta.get("attrs", {})
-    factors = named_factors(layout.meta) if COUNT not in layout.meta else {}
-    scales = [scale_told(layout.names[i], layout.units[i], values[:, i], factors) for i in kept]
+    told = {} if COUNT in layout.meta else layout.meta
+    factors = {i: named_factors(told, words_of(layout.names[i])) for i in kept}
+    scales = [scale_told(layout.names[i], layout.units[i], values[:, i], factors[i]) for i in kept]
     notes += [words for words in scales if words is not None]
     return Record(
         values if len(kept) == values.shape[1] else values[:, kept],
@@ -445,7 +480,7 @@ def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, ref
         for number, line in enumerate(text, 1):
             if number <= layout.first or not line.strip() or COMMENT.match(line):
                 continue
-            cells = split_cells((pointed(line) if layout.halves else line).split("#")[0], layout.separator)
+            cells = split_cells(_with_plain_numbers(layout)(line).split("#")[0], layout.separator)
             if layout.separator == "\t" and len(cells) == width - 1 and layout.empty:
                 cells.append("")
             if len(cells) > width or (refuse and len(cells) < width):
@@ -457,6 +492,9 @@ def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, ref
                 if kind == "gap" and refuse and column not in layout.slow:
                     shown = f"{cell[:40]!r}" if cell else "nothing"
                     return f"line {number} holds {shown} in column {layout.names[column]!r}; {REMEDY}"
+                sign = between_thousands(cell)
+                if kind not in ("number", "gap") and sign is not None:
+                    return f"line {number} holds {cell[:40]!r}, with {sign!r} between thousands; {WITHOUT}"
                 if kind not in ("number", "gap"):
                     return f"line {number} holds {cell[:40]!r}, which is not a number"
                 if refuse and not np.isfinite(float(cell.replace(",", ".") if layout.decimal == "," else cell)):
@@ -466,6 +504,10 @@ def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, ref
 
 def _quoted(cell: str) -> str:
     return '"' + cell.replace('"', '""') + '"' if any(c in cell for c in ',"\n') else cell
+
+
+def _is_utf16(head: bytes) -> bool:
+    return head.startswith((b"\xff\xfe", b"\xfe\xff")) or utf16_without_mark(head) is not None
 
 
 def _is_text(head: bytes) -> bool:
@@ -484,8 +526,8 @@ def _format(packed: bool, contents: dict[str, Content], also: tuple[str, ...] = 
         if asked.content == "lvm":
             return None
         with _damage_named(path):
-            whole = bool(_layout(path, packed).groups)
-        return None if whole else csv_pieces(path, packed, asked.rate, asked.gaps)
+            layout = _layout(path, packed)
+        return None if layout.groups else csv_pieces(path, packed, asked.rate, asked.gaps, layout)
 
     def write(record: Record, path: Path, progress: Progress | None) -> None:
         write_csv(record, path, packed, progress)
@@ -497,7 +539,7 @@ FORMATS = {
     "csv": _format(
         False,
         {
-            "utf16": Content("text in UTF-16", begins_with(b"\xff\xfe", b"\xfe\xff")),
+            "utf16": Content("text in UTF-16", _is_utf16),
             "text": Content("plain text", _is_text, rest=True),
         },
         also=("lvm",),

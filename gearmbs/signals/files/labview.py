@@ -14,8 +14,8 @@ import numpy as np
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.encodings import decoded
 from gearmbs.signals.files.table import Content, Format, begins_with
-from gearmbs.signals.files.text_tables import decoded
 from gearmbs.signals.signal.labels import SLOW_ROLES, SLOW_SAID, role_of, tells_time
 from gearmbs.signals.signal.record import (
     RateCandidate,

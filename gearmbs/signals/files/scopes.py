@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gearmbs.signals.files.text_tables import CsvLayout, is_number, split_cells
 from gearmbs.signals.signal.labels import name_and_unit, unique_names
@@ -41,7 +42,12 @@ def _sequence(rows: list[list[str]], first: int) -> CsvLayout | None:
         return None
     told = {"t0": float(rows[1][k]), "sample interval": f"{rows[1][k + 1]} s"}
     units = ["V" if cell.lower() in ("volt", "volts") else cell for cell in rows[1][1:k]]
-    return _layout(first, ["index", *rows[0][1:k]], [UNKNOWN_UNITS, *units], len(rows[2]), told, index=0)
+    # logic channels have no unit and are written as 0x00
+    words = tuple(
+        i for i, unit in enumerate(units, 1) if not unit and rows[2][i : i + 1] and not _numbers([rows[2][i]])
+    )
+    layout = _layout(first, ["index", *rows[0][1:k]], [UNKNOWN_UNITS, *units], len(rows[2]), told, index=0)
+    return replace(layout, beside=words)
 
 
 def _increment(line: str, rows: list[list[str]], first: int) -> CsvLayout | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
 import json
 import re
@@ -16,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.cells import of_24_hours
 from gearmbs.signals.files.own_clocks import Group
 from gearmbs.signals.signal.labels import (
     is_clock,
@@ -34,10 +34,10 @@ HEAD_LINES = 400
 COMMENT = re.compile(r"^\s*[#%]")
 KEY_VALUE = re.compile(r"^\s*[#%]*\s*[\"']?([^\W\d][^:=;,\t\"]*?)[\"']?\s*(?:[:=][\s,;]*|[,;\t]\s*)(.*?)[\s,;\"']*$")
 GAP_CELLS = frozenset(
-    {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf"}
+    {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf", "∞", "-∞", "+∞"}
 )
 DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.](?:\d{1,2}|[A-Za-z]{3})[-/.]\d{4})"
-CLOCK = r"(?:\d+ days? )?\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?"
+CLOCK = r"(?:\d+ days? )?\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?: ?[AaPp]\.?[Mm]\.?)?(?:Z|[+-]\d{2}:?\d{2})?"
 DURATION = re.compile(r"^([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?) ?(ms|sec|s|min|hr|days|day)$")
 """As MATLAB writes times of a timetable."""
 STAMPS: tuple[tuple[str, re.Pattern[str]], ...] = (
@@ -81,6 +81,8 @@ class CsvLayout:
         Column that may only number the rows, or hold times.
     halves : bool
         Whether each second comma is that of a number (`pointed`).
+    printed : bool
+        Whether other signs than - may stand for a minus.
     beside : tuple of int
         Columns of words beside the table, of no use.
     groups : tuple of Group
@@ -99,6 +101,7 @@ class CsvLayout:
     empty: tuple[int, ...] = ()
     notes: list[str] = field(default_factory=list)
     halves: bool = False
+    printed: bool = False
     beside: tuple[int, ...] = ()
     groups: tuple[Group, ...] = ()
 
@@ -436,13 +439,13 @@ class Times:
         texts = stamped.iloc[:, 0].astype(str).str.strip().str.strip('"')
         for column in stamped.columns[1:]:
             texts = texts + " " + stamped[column].astype(str).str.strip().str.strip('"')
-        texts = texts.str.replace(",", ".", regex=False)
+        texts, halves = of_24_hours(texts.str.replace(",", ".", regex=False))
         if DURATION.match(texts.iloc[0]):
             seconds = self._of_durations(texts)
         elif re.match(r"^(\d+ days? )?\d{1,2}:", texts.iloc[0]):
             seconds = self._of_clocks(texts)
         else:
-            seconds = self._of_dates(texts)
+            seconds = self._of_dates(texts, halves)
         if self.origin is None:
             self.origin = float(seconds[0])
         return seconds - self.origin
@@ -460,9 +463,9 @@ class Times:
             return (column - self.origin) * factor
         return column * factor
 
-    def _of_dates(self, texts: pd.Series) -> np.ndarray:
+    def _of_dates(self, texts: pd.Series, american: bool) -> np.ndarray:
         try:
-            found = pd.to_datetime(_iso(texts), format="ISO8601", utc=True)
+            found = pd.to_datetime(_iso(texts, american), format="ISO8601", utc=True)
         except (ValueError, OverflowError) as exc:
             raise SignalFileError(self.path, f"its time stamps cannot be read ({str(exc).splitlines()[0]})") from exc
         if found.isna().any():
@@ -495,8 +498,8 @@ class Times:
         return out
 
 
-def _iso(texts: pd.Series) -> pd.Series:
-    """Stamps with their dates as year-month-day; of 3/4/2024 the day comes first unless that cannot be."""
+def _iso(texts: pd.Series, american: bool) -> pd.Series:
+    """Stamps with their dates as year-month-day; of 3/4/2024 the day is first unless it is American, or cannot be."""
     if re.match(r"^\d{1,2}-[A-Za-z]{3}-", texts.iloc[0]):
         named = texts.str.extract(r"^(\d{1,2})-([A-Za-z]{3})-(\d{4})(.*)$")
         number = named[1].str.lower().map(MONTHS)
@@ -508,7 +511,7 @@ def _iso(texts: pd.Series) -> pd.Series:
         found = texts.str.extract(r"^(\d{1,2})[-/.](\d{1,2})[-/.](\d{4})(.*)$")
         if found[0].isna().any():
             return texts
-        american = bool((found[1].astype(int) > 12).any())
+        american = bool((found[1].astype(int) > 12).any()) or (american and bool((found[0].astype(int) < 13).all()))
         parts = [found[k] for k in ((2, 0, 1, 3) if american else (2, 1, 0, 3))]
     year, month, day, rest = parts
     return year + "-" + month.str.zfill(2) + "-" + day.str.zfill(2) + rest
@@ -536,38 +539,3 @@ def index_meaning(
             ), None
         return "The first column rises evenly; it is taken for the time in s.", column
     return None, None
-
-
-# Text as instruments write it: with byte-order marks, in UTF-8, UTF-16 or Windows' own code.
-
-
-MARKS = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF32_LE, "utf-32"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
-FALLBACK, CENTRAL = "cp1252", "cp1250"
-CENTRAL_VOWELS, CENTRAL_CONSONANTS = frozenset(b"\xe1\xed\xfd"), frozenset(b"\xe8\xec\xf8\xf9")
-"""Czech a, i, y with an acute, which Western languages at home in 1252 hardly have, and beside them c, e, r, u."""
-CENTRAL_CAPITAL = re.compile(rb"\xc8[a-z]")
-"""A Czech C at the begin of a word."""
-
-
-def encoding_of(head: bytes) -> str:
-    """The encoding of a text from its first bytes: by its mark, UTF-8 if it is valid, else Windows' Western code, or
-    its Central European one where letters of Czech stand."""
-    for mark, name in MARKS:
-        if head.startswith(mark):
-            return name
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(head)
-    except UnicodeDecodeError:
-        central = not CENTRAL_VOWELS.isdisjoint(head) and not CENTRAL_CONSONANTS.isdisjoint(head)
-        return CENTRAL if central or CENTRAL_CAPITAL.search(head) else FALLBACK
-    return "utf-8"
-
-
-def decoded(data: bytes) -> str:
-    """The text of some bytes; what cannot be decoded becomes the replacement character."""
-    return data.decode(encoding_of(data[: 1 << 16]), errors="replace")

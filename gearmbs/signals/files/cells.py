@@ -1,0 +1,80 @@
+"""What cells of text tables hold beside plain numbers: printed minus signs, groups of thousands, AM and PM."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+import pandas as pd
+
+MINUS = "\u2212\u2013\u2012\ufe63\uff0d"
+"""Signs that typesetters and spreadsheets write for a minus."""
+PRINTED_MINUS = re.compile(rf"(?:(?<![\w.])|(?<=\d[eE]))[{MINUS}](?=[\d.,])")
+SPACES = "\u00a0\u202f\u2009 "
+GROUPED = re.compile(rf"[-+]?\d{{1,3}}(?P<sign>[.,'\u2019{SPACES}])\d{{3}}(?:(?P=sign)\d{{3}})*(?:[.,]\d+)?")
+THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
+BELOW = re.compile(r"[-+]?\d{1,3}")
+FEWEST = 3
+"""Cells of either kind by which digits in threes are told from decimals."""
+HALF_DAY = re.compile(r"^(.*?)(\d{1,2})(:\d{2}.*?)\s?([AaPp])\.?[Mm]\.?$")
+WITHOUT = "write numbers without separators of thousands (in spreadsheets a format of the cells)"
+
+
+def with_minus(line: str) -> str:
+    """Return a line with a plain minus for each printed one before a number.
+
+    Examples
+    --------
+    >>> with_minus("0.1;\u22120.5;1e\u22123")
+    '0.1;-0.5;1e-3'
+    """
+    return PRINTED_MINUS.sub("-", line)
+
+
+def between_thousands(cell: str) -> str | None:
+    """Return the sign between the thousands of a cell, or None.
+
+    Examples
+    --------
+    >>> [between_thousands(cell) for cell in ("-1.165,44", "1 000", "1,000,000", "1.5")]
+    ['.', ' ', ',', None]
+    """
+    text = cell.strip().strip('"').strip()
+    found = GROUPED.fullmatch(text)
+    return None if found is None else found["sign"]
+
+
+def in_thousands(cells: Iterable[str], decimal: str) -> str | None:
+    """Return a cell of a column whose decimal sign separates thousands, or None.
+
+    All numbers with the sign have three digits behind it, of which some end with a zero, and one to three before, which
+    begin with none; all others have at most three. Decimals of a fixed format stand in all numbers, and others end with
+    no zero.
+    """
+    present = [cell.strip().strip('"') for cell in cells if cell.strip().strip('"')]
+    signed = [cell for cell in present if decimal in cell]
+    plain = [cell for cell in present if decimal not in cell]
+    if min(len(signed), len(plain)) < FEWEST:
+        return None
+    told = all(map(THOUSANDS.fullmatch, signed)) and all(map(BELOW.fullmatch, plain))
+    return next((cell for cell in signed if cell.endswith("0")), None) if told else None
+
+
+def thousands_column(rows: Sequence[Sequence[str]], names: Sequence[str], decimal: str) -> tuple[str, str] | None:
+    """Return name and a cell of the first column with separators of thousands that look like decimals, or None."""
+    for i, name in enumerate(names):
+        cell = in_thousands((row[i] for row in rows if i < len(row)), decimal)
+        if cell is not None:
+            return name, cell
+    return None
+
+
+def of_24_hours(texts: pd.Series) -> tuple[pd.Series, bool]:
+    """Return times of day without AM and PM, and whether there were some: then dates have the month first."""
+    parts = texts.str.extract(HALF_DAY)
+    found = parts[0].notna()
+    if not found.any():
+        return texts, False
+    hours = pd.to_numeric(parts[1]) % 12 + 12 * parts[3].str.lower().eq("p")
+    written = parts[0] + hours.fillna(0).astype(int).astype(str).str.zfill(2) + parts[2]
+    return texts.where(~found, written), True
