@@ -209,3 +209,21 @@ def test_the_speed_over_a_series_in_ms_is_that_of_the_record():
     speeds = pd.Series(150.0 + 10.0 * np.array([0.0, 1.0, 2.0]), index=pd.Index([0.0, 30.0, 60.0], name="t_ms"))
     signal = to_signal(pd.DataFrame({"acc [g]": A}, index=pd.Index(TIME, name="t")), speed=speeds)
     np.testing.assert_allclose(signal["speed"].values, 150.0 + 10.0 * TIME / 0.03)
+
+
+@pytest.mark.parametrize("first", [738000.0, 45363.42])
+def test_days_without_a_unit_are_asked_for_and_with_one_read(first, tmp_path):
+    """MATLAB's datenum, whose digits end at 10 us, and dates of spreadsheets, of which the rate had been 1e9 Hz."""
+    days = first + TIME / 86400.0
+    pd.DataFrame({"Time": days, "a": A}).to_csv(tmp_path / "a.csv", index=False)
+    scipy.io.savemat(tmp_path / "a.mat", {"t": days, "a": A})
+    for name in ("a.csv", "a.mat"):
+        with pytest.raises(SignalFileError, match=says("time", "days", "Time [d]")):
+            read_signal(tmp_path / name)
+    pd.DataFrame({"Time [d]": days, "a": A}).to_csv(tmp_path / "b.csv", index=False)
+    scipy.io.savemat(tmp_path / "b.mat", {"t": days, "a": A, "tUnit": "d"})
+    for name in ("b.csv", "b.mat"):
+        given = {"rate": RATE} if first > 1e5 else {}
+        assert read_signal(tmp_path / name, **given).attrs["sampling_rate"] == pytest.approx(RATE)
+    pd.DataFrame({"t": 45363.42 + TIME, "a": A}).to_csv(tmp_path / "s.csv", index=False)
+    assert read_signal(tmp_path / "s.csv").attrs["sampling_rate"] == pytest.approx(RATE)

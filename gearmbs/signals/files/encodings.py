@@ -27,8 +27,8 @@ def encoding_of(head: bytes) -> str:
     for mark, name in MARKS:
         if head.startswith(mark):
             return name
-    if (name := utf16_without_mark(head)) is not None:
-        return name
+    if (unmarked := utf16_without_mark(head)) is not None:
+        return unmarked
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)
     except UnicodeDecodeError:

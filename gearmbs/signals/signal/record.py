@@ -224,6 +224,10 @@ def same_rate(path: Path, rates: Mapping[str, float | None]) -> float | None:
     return next((rate for rate in rates.values() if rate is not None), None)
 
 
+FASTEST = 2e7
+"""Sampling rate in Hz of no vibration: its steps in s are those of days of slower records."""
+DAYS = (3e4, 9e5)
+"""Days since 1900 of spreadsheets, and since the year 0 of MATLAB, in our times."""
 SAME_START = 0.5
 """Samples by which channels of one record may begin at other times."""
 
@@ -575,7 +579,14 @@ def rate_by_times(times: np.ndarray, path: Path, given: float | None, others: bo
 
 def rate_from_times(times: np.ndarray, path: Path) -> float:
     """Sampling rate in Hz of the times in a file; the error names the file."""
+    times = np.asarray(times, dtype=float)
     try:
-        return uniform_rate(np.asarray(times, dtype=float))
+        rate = uniform_rate(times)
+        if rate > FASTEST and DAYS[0] < times[0] < DAYS[1]:
+            raise SignalError(
+                f"time: rises from {times[0]:.9g} in steps of {1.0 / rate:.3g}, as days do (MATLAB's datenum, dates of "
+                "spreadsheets); name the unit, as Time [d] or TimeUnit = 'd', or write the times in s"
+            )
+        return rate
     except SignalError as exc:
         raise SignalFileError(path, str(exc)) from exc
