@@ -12,7 +12,7 @@ marks, so that an order just below half the lines is as right as a low one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import NamedTuple
@@ -30,6 +30,9 @@ SMOOTHINGS = 2
 FINE = 12
 """Parts of a turn over which the common angle is smoothed, twice: of a swing of order 1 a part in 1900 is left beside
 it, of order 4 a tenth, of order 12 all; of teeth nothing is let through."""
+KNOTS, FEWEST_PIECES = 4.0, 3
+"""Turns between the knots of a shaft's slow turning, and its pieces at least: a quarter of an order and more is left
+beside it to 3 % in 60 turns, half to 1 %, of a tenth a thirtieth."""
 FEWEST_TURNS = 4
 """Turns of the slower shaft within the smooth angle: a window of as many parts orders that lie one apart."""
 BRIDGINGS = 3
@@ -114,7 +117,7 @@ class Window(NamedTuple):
 class Course(NamedTuple):
     """The common angle, rad, over time, and where it is known (s)."""
 
-    angle: scipy.interpolate.CubicSpline
+    angle: Callable[[np.ndarray | float], np.ndarray]
     begin: float
     end: float
 
@@ -171,6 +174,21 @@ def common_angle(train: PulseTrain, errors: np.ndarray | None = None) -> Course:
             scipy.interpolate.CubicSpline(mean, course.angle(mean) + middle), float(mean[0]), float(mean[-1])
         )
     return course
+
+
+def slow_angle(train: PulseTrain) -> Course:
+    """Return the angle of a shaft without what swings of it a few times a turn or once in a few: cubic splines."""
+    numbers, times, _ = train.every()
+    parts = max(FEWEST_PIECES, math.floor(train.turns / KNOTS))
+    knots = np.interp(np.linspace(numbers[0], numbers[-1], parts + 1)[1:-1], numbers, times)
+    angle = TURN / train.lines * numbers
+    # about the mean, so that no digits are lost
+    middle, straight = 0.5 * (times[0] + times[-1]), train.mean_speed
+    at = times - middle
+    spline = scipy.interpolate.make_lsq_spline(
+        at, angle - straight * at, np.r_[(at[0],) * 4, knots - middle, (at[-1],) * 4], k=3
+    )
+    return Course(lambda t: spline(t - middle) + straight * (t - middle), float(times[0]), float(times[-1]))
 
 
 def _turn_means(count: int, values: np.ndarray) -> np.ndarray:

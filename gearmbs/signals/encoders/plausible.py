@@ -31,6 +31,9 @@ MULTIPLES = 3
 CANDIDATES = 12
 WIDTH = 1.5
 """Lines of the spectrum by which an order may seem to be off."""
+STRAY, LEAST_STRAY, MOST_STRAY = 4.0, 0.02, 5
+"""Lines of the spectrum to either side of a shaft's order that are its own; part of the largest line from which others
+are told, and how many."""
 LEAST_MARKS = 5e-4
 """Pitches, RMS: a mesh stands out of smaller errors; in simulations without noise they are those of splines."""
 LARGE_HARMONICS, BESIDE_MESH = 6, 1
@@ -54,8 +57,9 @@ TICKS = 3.0
 
 
 def doubted_numbers(
-    first: Deviations, second: Deviations, begin: float, end: float, gearing: Gearing, lines: Sequence[int]
-) -> str | None:
+    first: Deviations, second: Deviations, begin: float, end: float, gearing: Gearing, lines: Sequence[int],
+    several: bool = False,
+) -> str | None:  # fmt: skip
     """Return what is wrong with the told teeth and lines, or None.
 
     Parameters
@@ -66,6 +70,9 @@ def doubted_numbers(
         Stretch of the common angle, rad.
     gearing : Gearing
     lines : (int, int)
+    several : bool
+        Whether there may be further meshes between the shafts, whose lines are no contradiction where the told one
+        stands, too.
     """
     turns = (end - begin) / TURN
     limit = SEEN * min(lines[0], lines[1] / float(gearing.ratio))
@@ -97,6 +104,8 @@ def doubted_numbers(
             families.append((sum(amplitude[line(k * peak)] for k in own), exact, own[-1]))
     if not families:
         return None
+    if several and stands(told):
+        return None
     _, found, count = max(families)
     times, part = found / told, told / found
     # the highest multiple tells it best
@@ -114,6 +123,35 @@ def doubted_numbers(
     ):
         return None
     return _words(found, told, gearing, lines, turns * count)
+
+
+def stray_lines(
+    first: Deviations, second: Deviations, begin: float, end: float, gearing: Gearing, lines: Sequence[int]
+) -> list[tuple[float, float]]:
+    """Return orders of the first shaft where lines stand that are whole orders of neither shaft, and their heights.
+
+    They are those of shafts and meshes between the two. The heights are rad of the first shaft, the largest first.
+
+    Parameters
+    ----------
+    first, second, begin, end, gearing, lines
+        As for `doubted_numbers`.
+    """
+    turns, ratio = (end - begin) / TURN, float(gearing.ratio)
+    limit = SEEN * min(lines[0], lines[1] / ratio)
+    amplitude = _spectrum(first, second, begin, turns, limit)
+    order = np.arange(amplitude.size) / turns
+    off = np.minimum(*(np.abs(order * scale - np.rint(order * scale)) / scale for scale in (1.0, ratio)))
+    mesh = np.abs(order - float(gearing.mesh) * np.maximum(np.rint(order / float(gearing.mesh)), 1.0))
+    alone = (off > STRAY / turns) & (mesh > MODULATED) & (order > STRAY / turns)
+    inner = amplitude[1:-1]
+    peak = np.r_[False, (inner > amplitude[:-2]) & (inner >= amplitude[2:]), False] & alone
+    level = STANDS * float(np.median(amplitude)) * math.sqrt(math.log(max(amplitude.size, 2)))
+    # marks that are not known have lines at whole orders, and beside them where the speed varies
+    level = max(level, STANDS * float(np.median(amplitude[off <= 0.5 / turns])))
+    found = np.flatnonzero(peak & (amplitude > max(level, LEAST_STRAY * float(amplitude.max()))))
+    found = found[np.argsort(amplitude[found])[::-1][:MOST_STRAY]]
+    return [(float(order[k]), float(amplitude[k])) for k in found]
 
 
 def repeating_marks(trains: Sequence[PulseTrain], mesh: Sequence[float], ratio: float = 1.0) -> str | None:

@@ -28,7 +28,7 @@ from gearmbs.signals.encoders.orders import (
     folded,
     smooth_angle,
 )
-from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks
+from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks, stray_lines
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
 from gearmbs.signals.encoders.visible import (
@@ -88,6 +88,7 @@ class _Measured:
     scattered: int
     doubt: str | None
     window: Window
+    stray: list[tuple[float, float]]
 
     @property
     def wander(self) -> float:
@@ -175,12 +176,13 @@ def transmission_error_from_pulses(
     remarks += _check_free(runs, freed, gearing)
     # known marks are put right where the pulses are, as the wheels' lag moves them; what is left of them is an unknown
     errors = {name: encoder_marks(trains).errors if trains else None for name, trains in freed.items()}
-    measured, standing = _all_lines(runs, gearing, orders, errors)
+    measured, standing = _all_lines(runs, gearing, orders, errors, teeth is None)
     if standing:
         orders = [o for o in orders if o.order not in standing]
-        measured, _ = _all_lines(runs, gearing, orders, errors)
+        measured, _ = _all_lines(runs, gearing, orders, errors, teeth is None)
         refused += folded_onto(standing, gearing)
     shifts, notes = _shifts(measured, gearing)
+    notes += [_strayed(one, radius) for one in measured if one.stray]
     notes = list(dict.fromkeys([n for r in runs for t in (r.driver, r.driven) for n in t.notes] + notes + remarks))
     marks = {
         name: [_free_lines(train, name, _whole(orders, k), errors[name]) for train in freed[name]]
@@ -319,12 +321,16 @@ SURELY = 3.0
 
 
 def _all_lines(
-    runs: Sequence[CoupledRun], gearing: Gearing, orders: Sequence[Order], errors: Mapping[str, np.ndarray | None]
+    runs: Sequence[CoupledRun],
+    gearing: Gearing,
+    orders: Sequence[Order],
+    errors: Mapping[str, np.ndarray | None],
+    several: bool,
 ) -> tuple[list[_Measured], dict[Fraction, tuple[str, int]]]:
     """Evaluate all runs; with known marks, also the shafts' orders that turn out to be later mesh harmonics, folded."""
     trains = (runs[0].driver, runs[0].driven)
     hidden = hidden_harmonics(gearing, trains, orders)
-    measured = [_lines_of(run, gearing, orders, hidden, errors) for run in runs]
+    measured = [_lines_of(run, gearing, orders, hidden, errors, several) for run in runs]
     if any(known is None for known in errors.values()):
         return measured, {}
     squares = {o.order: float(np.mean([abs(m.values[o.order].value) ** 2 for m in measured])) for o in orders}
@@ -337,6 +343,7 @@ def _lines_of(
     orders: Sequence[Order],
     hidden: Sequence[Sequence[Fraction]],
     errors: Mapping[str, np.ndarray | None],
+    several: bool,
 ) -> _Measured:
     """Evaluate a run at all orders."""
     course = common_angle(run.driver, errors["driver"])
@@ -370,9 +377,21 @@ def _lines_of(
     trains = (run.driver, run.driven)
     doubt = repeating_marks(trains, (float(gearing.mesh), float(gearing.on_second(gearing.mesh))), scale)
     # marks that repeat are told for lines of a mesh otherwise
-    doubt = doubt or doubted_numbers(first, second, begin, end, gearing, (run.driver.lines, run.driven.lines))
+    told = first, second, begin, end, gearing, (run.driver.lines, run.driven.lines)
+    doubt = doubt or doubted_numbers(*told, several)
     scattered = min(max(2, math.floor(slower)), MOST_SCATTER)
-    return _Measured(run, values, mesh, scale, second.mean / scale, scattered, doubt, window)
+    return _Measured(
+        run, values, mesh, scale, second.mean / scale, scattered, doubt, window, stray_lines(*told) if several else []
+    )
+
+
+def _strayed(one: _Measured, radius: float) -> str:
+    """Return what is said of lines that are of neither shaft."""
+    listed = ", ".join(f"{order:.5g} ({1e6 * radius * height:.3g} um)" for order, height in one.stray)
+    return (
+        f"CHECK THE SHAFTS BETWEEN: lines stand at orders {listed} of the driver, whole ones of neither shaft, as of "
+        "shafts and meshes between the two: curves, F_i' and errors of teeth lack them."
+    )
 
 
 def _check_clocks(run: CoupledRun, drift: float, mesh: float, turns: float) -> None:
@@ -419,12 +438,13 @@ def _shifts(measured: Sequence[_Measured], gearing: Gearing) -> tuple[list[tuple
         if k == 0:
             found.append((told[0], told[1]))
             continue
-        expected = (told[0] - found[0][0]) / float(gearing.ratio) + told[1] - found[0][1]
+        # of a disc turned in the sense of rotation each mark passes earlier
+        expected = told[1] - found[0][1] - (told[0] - found[0][0]) / float(gearing.ratio)
         off = one.place - measured[0].place - expected
         off -= pitch * round(off / pitch)
         if sum(s != 0.0 for s in told) == 1:
             at = 0 if told[0] else 1
-            by = off * (float(gearing.ratio) if at == 0 else 1.0)
+            by = off * (-float(gearing.ratio) if at == 0 else 1.0)
             told = (told[0] + by, told[1]) if at == 0 else (told[0], told[1] + by)
             notes.append(
                 f"Run {k + 1}: the disc of the {('driver', 'driven')[at]} was turned by {math.degrees(told[at]):.4f} "
@@ -468,9 +488,9 @@ def _rows(
         if unknown and order.second is not None:
             variance += unknown * (order.second * one.wander) ** 2 * float(gearing.ratio) ** 2
         if order.first is not None or order.second is None:
-            phase = np.exp(1j * float(order.order) * shift[0])
+            phase = np.exp(-1j * float(order.order) * shift[0])
         else:
-            phase = np.exp(1j * order.second * (one.place + shift[1]))
+            phase = np.exp(1j * order.second * (one.place - shift[1]))
         factors: dict[str, complex] = {f"T {one.run.load}": complex(phase)}
         if order.first is not None:
             factors["driver"] = -1.0 + 0.0j

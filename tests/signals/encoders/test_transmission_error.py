@@ -22,7 +22,7 @@ from gearmbs.signals.encoders.plausible import repeating_marks
 from gearmbs.view import measured_error_plot
 from tests.generators import seed
 from tests.says import says
-from tests.signals.encoders.bench import Discs, closed, coupled, free, paper_error
+from tests.signals.encoders.bench import Discs, angle, closed, coupled, free, paper_error
 
 TEETH = (29, 29)
 
@@ -243,6 +243,58 @@ def test_turned_discs_tell_marks_and_errors_apart():
     wrong = CoupledRun(first.driver, first.driven, shift=(0.4 * half, 0))
     with pytest.raises(SignalError, match=says("shift", "sense")):
         transmission_error_from_pulses([base, wrong], TEETH, base_radius=radius)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("teeth", [0.25, 3.5])
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_disc_turned_in_the_sense_of_rotation_is_told_so(which, teeth):
+    """Its marks pass earlier. Eccentricities of both shafts come back with their phases; against it, they did."""
+    counts, ratio = (21, 34), 34 / 21
+    driver, driven = 10e-6, 6e-6
+
+    def lag(turned):
+        one = math.tau * turned
+        return driver * np.cos(one + 0.3) + driven * np.cos(one / ratio - 1.0) + 2e-6 * np.cos(21 * one)
+
+    angles = coupled(lag, counts, 0.04, turns=44, rate=20e3)
+    marks = [mark_errors(256, 0.01, k) for k in (0, 1)]
+    by = teeth * math.tau / counts[which]
+
+    def run(turned):
+        at = [-turned if k == which else 0.0 for k in (0, 1)]
+        return [encoder(angles[k], 256, marks=marks[k], mounted=at[k], index=True) for k in (0, 1)]
+
+    told = (by, 0.0) if which == 0 else (0.0, by)
+    found = transmission_error_from_pulses(
+        [CoupledRun(*run(0.0)), CoupledRun(*run(by), shift=told)], counts, base_radius=0.04
+    )
+    orders = found.shaft_orders()
+    name, height, phase = (("driver", driver, 0.3), ("driven", driven, -1.0))[which]
+    line = orders[np.isclose(orders[f"order_{name}"], 1.0)].iloc[0]
+    assert line["amplitude"] == pytest.approx(height, rel=0.02)
+    assert line["phase"] == pytest.approx(phase, abs=0.1)
+
+
+@pytest.mark.slow
+def test_a_line_of_a_shaft_between_is_told():
+    """Of a train of two stages, told by ratio: neither is it silent, nor doubts its second mesh the told one."""
+    ratio, mesh, between = Fraction(34 * 53, 21 * 17), Fraction(21), 21 / 34
+    error = {21.0: 3e-6, 10.5: 5e-6, between: 4e-6}
+
+    def shafts(lines):
+        lag = lambda turned: sum(a * np.cos(math.tau * o * turned + o) for o, a in lines.items())  # noqa: E731
+        driver, driven = coupled(lag, (106, 535), 0.025, turns=250, rate=4e3)
+        return driver, angle(driven.values * 535 / 106 / float(ratio), driven["time"].values)
+
+    def found(lines):
+        pulses = [encoder(a, 256) for a in shafts(lines)]
+        return transmission_error_from_pulses(CoupledRun(*pulses), base_radius=0.025, ratio=ratio, mesh_order=mesh)
+
+    told = found(error)
+    assert any("0.618" in note or "0.6179" in note for note in told.notes if "BETWEEN" in note)
+    assert "CHECK" not in told.verdict
+    assert not any("BETWEEN" in note for note in found({21.0: 3e-6, 1.0: 2e-6, 0.5: 0.0}).notes)
 
 
 @pytest.mark.slow
