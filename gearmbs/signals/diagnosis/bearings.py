@@ -41,7 +41,7 @@ from gearmbs.signals.rotation.angular import angular_resample
 from gearmbs.signals.rotation.phase import phase_from_speed
 from gearmbs.signals.rotation.separation import level_lines, prewhiten
 from gearmbs.signals.rotation.shaft import shaft_phase
-from gearmbs.signals.rotation.sweep import remark_sweep
+from gearmbs.signals.rotation.sweep import swept
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.signal import like, rate_of, require, shaft_coords, units_of
 from gearmbs.signals.signal.units import Given, unit_dimension
@@ -265,6 +265,7 @@ def diagnose_bearing(
     timed = phase is not None
     weighed = weigh(spectra, told, 0.0 if timed else tolerance, others or (), judge_at, timed, curve)
     findings, clearest = _found(signal, weighed, heard, known, others, slip, level, highest)
+    moved = [] if timed else swept(signal, math.tau * told)
     return BearingReport(
         source=str(signal.attrs.get("source", signal.name or "signal")),
         rate=rate,
@@ -276,10 +277,10 @@ def diagnose_bearing(
         spectra={name: _table(each, highest * (harmonics + 1)) for name, each in clearest.items()},
         levels=_levels(signal),
         shafts=others,
-        notes=notes,
+        notes=[*notes, *(words for words, doubted in moved if not doubted)],
         stability=_stability(weighed.answers),
         speed_remark=weighed.remark,
-        swept=[] if timed else remark_sweep(signal, math.tau * told),
+        swept=[words for words, doubted in moved if doubted],
     )
 
 

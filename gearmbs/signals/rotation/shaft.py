@@ -307,7 +307,7 @@ def mesh_shaft(
         shaft = Shaft(phase, estimate.speed, "estimated from the mesh line", estimate)
     remark_plausibility(signal, shaft.speed, found is None, notes)
     if (found is None or isinstance(found, float)) and (shaft.estimate is None or shaft.estimate.phase is None):
-        notes += remark_sweep(signal, shaft.speed)
+        notes += remark_sweep(signal, shaft.speed, teeth)
     if shaft.phase.attrs.get("origin") == "line":
         notes += remark_wander(signal, shaft.speed, teeth[0])
     return shaft, signal

@@ -10,11 +10,13 @@ Student's t over the pairs tells it from chance.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.fft
 import xarray as xr
 
+from gearmbs.signals.rotation.moving import PIECES, is_the_shafts, moving, still_orders
 from gearmbs.signals.rotation.speed import CLIP_DB, FLOOR_BINS, RANGE_DB
 from gearmbs.signals.signal.signal import rate_of
 from gearmbs.signals.spectra import periodograms
@@ -50,6 +52,8 @@ WANDER, CLEAR = 7e-4, 10.0
 (20, 32 and 50 teeth, wobbles of 0 to 1 % at 0.5 to 2 Hz, two levels of noise, sidebands) averages that keep 0.94 and
 more of the mesh have at most 5.4e-4, those that keep 0.71 and less 1e-3 and more at 33 times the floor; there are none
 between. In noise alone it is 0.8 to 1.5 times the floor, in four measured records at most 3."""
+LISTED = 8
+"""Orders that stand still, named."""
 FEWEST_LINES = 6
 """Lines of a spectrum of which a percentile and a median are taken."""
 
@@ -62,16 +66,22 @@ def moving_lines(signal: xr.DataArray) -> str | None:
     signal : xarray.DataArray
         Dimensions (time, channel).
     """
+    found = _best(signal)
+    return None if found is None else found[0]
+
+
+def _best(signal: xr.DataArray) -> tuple[str, np.ndarray] | None:
+    """Return the way lines move, and the values of the stretch where it is the surest."""
     eighth = signal.sizes["time"] // 8
     found = [
-        each
+        (*each, first, last)
         for first, last in STRETCHES
         for pieces in APART
         if (last - first) * eighth // pieces >= LEAST_PIECE
         for each in _shifts(signal.values[first * eighth : last * eighth], pieces)
     ]
-    t, way = max(found, default=(0.0, ""))
-    return way if t >= SURE else None
+    t, way, first, last = max(found, default=(0.0, "", 0, 0))
+    return (way, signal.values[first * eighth : last * eighth]) if t >= SURE else None
 
 
 def _shifts(values: np.ndarray, pieces: int) -> list[tuple[float, str]]:
@@ -100,6 +110,13 @@ def _student(values: np.ndarray) -> float:
 
 def _lines(values: np.ndarray, pieces: int) -> np.ndarray:
     """Return heights of what does not stand still over the logarithm of frequency, of length one for each piece."""
+    cells = _cells(values, pieces)[0]
+    cells = cells - cells.mean(axis=1, keepdims=True)
+    return cells / np.maximum(np.linalg.norm(cells, axis=1, keepdims=True), 1e-12)
+
+
+def _cells(values: np.ndarray, pieces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return heights of what does not stand still in pieces, dB, and the cycles of a sample that they are of."""
     whole = len(values) // pieces
     length = min(whole, LONGEST_PIECE)
     window = np.hanning(length)[:, None]
@@ -112,9 +129,7 @@ def _lines(values: np.ndarray, pieces: int) -> np.ndarray:
     place = np.exp(np.arange(math.log(FIRST_LINE), math.log(last), STEP))
     low = np.rint(place * math.exp(-0.5 * STEP)).astype(int)
     high = np.maximum(np.rint(place * math.exp(0.5 * STEP)).astype(int), low + 1)
-    cells = np.maximum.reduceat(moving, np.stack((low, high), axis=1).ravel()[:-1], axis=1)[:, ::2]
-    cells = cells - cells.mean(axis=1, keepdims=True)
-    return cells / np.maximum(np.linalg.norm(cells, axis=1, keepdims=True), 1e-12)
+    return np.maximum.reduceat(moving, np.stack((low, high), axis=1).ravel()[:-1], axis=1)[:, ::2], place / length
 
 
 def _heights(power: np.ndarray) -> np.ndarray:
@@ -127,16 +142,39 @@ def _heights(power: np.ndarray) -> np.ndarray:
     return heights.mean(axis=3).reshape(power.shape[0], -1)
 
 
-def remark_sweep(signal: xr.DataArray, speed: float) -> list[str]:
-    """Return what is to be said where the lines of a record move and one speed (rad/s) is taken for all of it."""
-    way = moving_lines(signal)
-    if way is None:
+def remark_sweep(signal: xr.DataArray, speed: float, teeth: Sequence[int] = ()) -> list[str]:
+    """Return what is to be said where the lines of a record move and one speed (rad/s) is taken for all of it.
+
+    What moves beside a shaft whose own orders stand still is told as that (`gearmbs.signals.rotation.moving`).
+    """
+    return [words for words, _ in swept(signal, speed, teeth)]
+
+
+def swept(signal: xr.DataArray, speed: float, teeth: Sequence[int] = ()) -> list[tuple[str, bool]]:
+    """Return the same, with whether the shaft's speed is in doubt by it."""
+    found = _best(signal)
+    if found is None:
         return []
-    return [
+    way, values = found
+    still = still_orders(signal, speed)
+    if still and len(values) // PIECES >= LEAST_PIECE:
+        rate = rate_of(signal)
+        cells, place = _cells(values, PIECES)
+        line = moving(values, rate, cells, rate * place, way == "up")
+        if line is not None and not is_the_shafts(line, speed, still, teeth, len(values) / signal.sizes["time"]):
+            a, b = (line.low, line.high) if way == "up" else (line.high, line.low)
+            orders = ", ".join(map(str, still[:LISTED]))
+            return [(
+                f"A line moves {way} in the record, from {a:.4g} to {b:.4g} Hz, while the shaft's orders {orders} "
+                "stand still: something else, as a drive, another machine or what grows warm. If it is the shaft's, "
+                "give the speed over time.", False,
+            )]  # fmt: skip
+    words = (
         f"CHECK THE SPEED: lines of the record move {way} in it, as in a {'run-up' if way == 'up' else 'coast-down'}, "
         f"and one speed is taken for all of it, {speed * 30.0 / math.pi:.1f} rpm. Give the speed over time (speed="
         "[('0 s', '900 rpm'), ...], --speed with a file), a channel of it (speed_channel=, --speed-channel) or a tacho."
-    ]
+    )
+    return [(words, True)]
 
 
 def remark_wander(signal: xr.DataArray, speed: float, count: int) -> list[str]:
