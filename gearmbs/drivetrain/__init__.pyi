@@ -38,6 +38,7 @@ from .loads import TableLoad as TableLoad
 from .loads import TorqueLoad as TorqueLoad
 from .loads import gear_pump_ripple as gear_pump_ripple
 from .members.carrier import FlexibleCarrier as FlexibleCarrier
+from .members.pins import rolling_pins as rolling_pins
 from .part import DrivetrainError as DrivetrainError
 from .parts import SENSORS as SENSORS
 from .parts import Accelerometer as Accelerometer
@@ -48,7 +49,6 @@ from .parts import SpeedSensor as SpeedSensor
 from .parts import TorqueSensor as TorqueSensor
 from .parts import Wheel as Wheel
 from .planetary import PlanetaryStage as PlanetaryStage
-from .planetary import rolling_pins as rolling_pins
 from .shaft import Shaft as Shaft
 from .torque_element import ShaftTorque as ShaftTorque
 from .torsional import TorsionalModel as TorsionalModel

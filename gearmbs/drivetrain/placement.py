@@ -18,9 +18,10 @@ import numpy as np
 
 from gearmbs.drivetrain.couplings.aligned import Coupling
 from gearmbs.drivetrain.couplings.misaligned import Misaligned, roles
+from gearmbs.drivetrain.kinematics import links
 from gearmbs.drivetrain.part import DrivetrainError, require
 from gearmbs.drivetrain.parts import GearMesh, Wheel
-from gearmbs.drivetrain.planetary import PlanetaryStage, assemble_stage
+from gearmbs.drivetrain.planetary import PlanetaryStage, assemble_stage, speed_rows
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.geometry import MM, turn_z
 
@@ -286,28 +287,47 @@ def _assembled(train: Drivetrain, last: frozenset[str]) -> Layout:
     places, directions = seats(train, pairs)
     wheels = {wheel.name: wheel.angle for wheel in train.wheels}
     angles: dict[str, float] = {}
-    paces: dict[str, float] = {}
     steps = list(order(train, last))
     followers = {(tie.second if forward else tie.first) for tie, forward, new in steps if new}
     for shaft in train.shafts:
         if shaft.name not in followers:
             angles[shaft.name] = shaft.angle or 0.0
-            paces[shaft.name] = 1.0
     for tie, forward, new in steps:
         here, there = (tie.first, tie.second) if forward else (tie.second, tie.first)
         if tie.mesh is None:
-            stands, pace = angles[here], 1.0
+            stands = angles[here]
             if tie.coupling is not None:
-                stands, pace = tie.coupling.follows(stands, forward=forward)
+                stands, _ = tie.coupling.follows(stands, forward=forward)
             given = train.part(there, Shaft).angle
             angles.setdefault(there, stands if given is None else given)
-            paces.setdefault(there, paces[here] * pace)
             continue
-        paces.setdefault(there, paces[here])
         _turn(train, tie, forward, new, pairs[tie.name], directions[tie.name], angles, wheels)
     for stage in train.planetary_stages:
         assemble_stage(train, stage, angles, wheels)
-    return Layout(places, angles, {n: 0.0 if a is None else a for n, a in wheels.items()}, directions, paces)
+    assembled_wheels = {n: 0.0 if a is None else a for n, a in wheels.items()}
+    return Layout(places, angles, assembled_wheels, directions, _paces(train, angles))
+
+
+def _paces(train: Drivetrain, angles: dict[str, float]) -> dict[str, float]:
+    """Return the speeds of shafts at the start over those of the operating point, behind universal joints others.
+
+    Drives have theirs, as far as the links between them leave it to them, the first one before the others.
+    """
+    names = list(train.speeds)
+    if not any(isinstance(one, Misaligned) and one.angle for one in train.couplings):
+        return dict.fromkeys(names, 1.0)
+    place = {name: k for k, name in enumerate(names)}
+    shares = {one.name: one.follows(angles[one.first])[1] for one in train.couplings}
+    rows = [(row, 0.0) for row in speed_rows(train, links(train), place, shares)]
+    for drive in train.drives:
+        row = np.zeros(len(names))
+        row[place[drive.shaft]] = 1.0
+        known = np.array([r for r, _ in rows])
+        if np.linalg.matrix_rank(np.vstack([known, row])) > np.linalg.matrix_rank(known):
+            rows.append((row, drive.speed))
+    matrix, wanted = np.array([r for r, _ in rows]), np.array([v for _, v in rows])
+    found = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+    return {n: float(found[k] / train.speeds[n]) if train.speeds[n] else 1.0 for n, k in place.items()}
 
 
 def _turn(

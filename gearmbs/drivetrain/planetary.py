@@ -11,14 +11,14 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 import scipy.linalg
 
-from gearmbs.drivetrain.connections import rolling_bearing
 from gearmbs.drivetrain.housing import Housing
 from gearmbs.drivetrain.members.carrier import FlexibleCarrier, add_carrier
+from gearmbs.drivetrain.members.pins import pin_bearing
 from gearmbs.drivetrain.part import Part, errors_named, require
 from gearmbs.drivetrain.parts import contact_law, flank_friction
 from gearmbs.drivetrain.shaft import Shaft
@@ -32,7 +32,6 @@ from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, to_si
 
 if TYPE_CHECKING:
-    from gearmbs.bearings.settings import BearingKeywords
     from gearmbs.drivetrain.drivetrain import Drivetrain
     from gearmbs.drivetrain.placement import Layout
     from gearmbs.mechanism.mechanism import Mechanism
@@ -174,49 +173,6 @@ class PlanetaryStage(Part):
         on_sun, known = train.nominal_power.members[self.name]["sun"], self.speeds(train)
         turns = -on_sun if on_sun else known["sun"] - known["carrier"]
         return replace(self.gears, rotation=-1 if turns < 0.0 else 1)
-
-
-def pin_bearing(given: Any) -> Support | PinBearing | None:
-    """Return what `gearmbs.gears.planetary_mechanism` takes as pins; see `PlanetaryStage`."""
-    if given is None or isinstance(given, Support):
-        return given
-    if isinstance(given, Mapping) and "rolling" not in given:
-        return Support(**given)
-    if callable(given):
-        return given
-    table = dict(given) if isinstance(given, Mapping) else {"rolling": given}
-    return rolling_pins(table.pop("rolling"), **table)
-
-
-def rolling_pins(bearing: Any, **settings: Unpack[BearingKeywords]) -> PinBearing:
-    """Return what puts rolling bearings between pins and planets, for `planetary_mechanism` and `PlanetaryRun`.
-
-    Parameters
-    ----------
-    bearing : Bearing or str
-        A `gearmbs.bearings.Bearing` or its designation. The inner ring is on the pin.
-    **settings
-        Of `gearmbs.bearings.RollingBearing`: defects (also as tables with their ``kind``), damping, ...
-
-    Raises
-    ------
-    BearingError
-        If the designation or a setting is unknown.
-    """
-    from gearmbs.bearings import RollingBearing
-    from gearmbs.bearings.defects import as_defects
-    from gearmbs.bearings.settings import bearing_settings
-
-    kind = rolling_bearing(bearing)
-    if "defects" in settings:
-        settings["defects"] = as_defects(settings["defects"])
-    bearing_settings(kind, settings, "RollingBearing")
-
-    def make(name: str, pin: Any, bore: Any) -> RollingBearing:
-        return RollingBearing(name, pin, bore, bearing=kind, **settings)
-
-    make.rolling = kind  # type: ignore[attr-defined]
-    return make
 
 
 def planetary_set(
@@ -445,6 +401,18 @@ def _willis(train: Drivetrain, stage: PlanetaryStage, place: Mapping[str, int]) 
     return row
 
 
+def speed_rows(
+    train: Drivetrain, links: list[Any], place: Mapping[str, int], shares: Mapping[str, float] | None = None
+) -> list[np.ndarray]:
+    """Return rows over the shafts that their speeds make zero, ``shares`` times the ratios of links by name."""
+    rows = [_willis(train, stage, place) for stage in differentials(train)]
+    for link in links:
+        row = np.zeros(len(place))
+        row[place[link.second]], row[place[link.first]] = 1.0, -link.ratio * (shares or {}).get(link.name, 1.0)
+        rows.append(row)
+    return rows
+
+
 def with_differentials(train: Drivetrain, links: list[Any], speeds: dict[str, float]) -> dict[str, float]:
     """Return the speeds of all shafts, those behind stages without a held member among them.
 
@@ -457,11 +425,7 @@ def with_differentials(train: Drivetrain, links: list[Any], speeds: dict[str, fl
     if not stages:
         return speeds
     place = {shaft.name: k for k, shaft in enumerate(train.shafts)}
-    rows = [_willis(train, stage, place) for stage in stages]
-    for link in links:
-        row = np.zeros(len(place))
-        row[place[link.second]], row[place[link.first]] = 1.0, -link.ratio
-        rows.append(row)
+    rows = speed_rows(train, links, place)
     a = np.array(rows)
     known = np.array([name in speeds for name in place])
     turned = np.array([speeds.get(name, 0.0) for name in place])

@@ -126,6 +126,8 @@ class TorsionalModel:
         """
         m, _, k = self.matrices()
         free = [i for i in range(len(self.names)) if i not in self.held]
+        if not free:
+            return np.zeros(0), np.zeros((len(self.names), 0))
         squares, vectors = scipy.linalg.eigh(k[np.ix_(free, free)], m[np.ix_(free, free)])
         largest = np.abs(squares).max(initial=0.0)
         squares[np.abs(squares) < 1e-10 * largest] = 0.0

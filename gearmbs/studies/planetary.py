@@ -12,8 +12,9 @@ import xarray as xr
 
 from gearmbs.dae import Status
 from gearmbs.dae.results.solution import Solution
-from gearmbs.drivetrain.planetary import SET_KEYS, pin_bearing, planetary_set
-from gearmbs.drivetrain.planetary import rolling_pins as rolling_pins
+from gearmbs.drivetrain.members.pins import pin_bearing
+from gearmbs.drivetrain.members.pins import rolling_pins as rolling_pins
+from gearmbs.drivetrain.planetary import SET_KEYS, planetary_set
 from gearmbs.gears import ElasticRim, PlanetarySet, Support, planetary_mechanism
 from gearmbs.gears.planetary_mechanism import PinBearing
 from gearmbs.mechanism import Mechanism

@@ -292,6 +292,29 @@ def test_planets_behind_a_joint_start_at_its_pace(body):
     assert np.linalg.norm(moved) == pytest.approx(40.5e-3 * train.speeds["out"] / cosine, rel=1e-9)
 
 
+def test_members_of_a_differential_start_as_willis_says():
+    """The sun behind a joint, the ring driven on its own: w_c = (z_s w_s + z_r w_r) / (z_s + z_r)."""
+    cosine = np.cos(np.deg2rad(25.0))
+    plain = line(UniversalJoint(name="j", first="one", second="two", angle="25 deg"), torque=0.0)
+    light = {"length": "100 mm", "diameter": "20 mm"}
+    train = Drivetrain(
+        "differential",
+        shafts=[*plain.shafts, *(Shaft(name=name, **light) for name in ("out", "ring"))],
+        couplings=plain.couplings,
+        bearings=[*plain.bearings, *(IdealBearing(name=f"at {name}", shaft=name) for name in ("out", "ring"))],
+        planetary_stages=[PlanetaryStage(name="set", gears=planetary((24, 30, 84), "1.5 mm", 3), sun="two",
+                                         carrier="out", ring="ring", sun_station="250 mm")],
+        drives=[*plain.drives, SpeedDrive(name="other", shaft="ring", speed=10.0)],
+        loads=[TorqueLoad(name="load", shaft="out", torque=20.0)],
+        running=True,
+    )  # fmt: skip
+    bodies, axis = train.build().bodies, train.layout.seats["out"].axes[:, 2]
+    sun, ring = SPEED / cosine, 10.0
+    speeds = {"two": sun, "ring": ring, "out": (24 * sun + 84 * ring) / 108}
+    for name, expected in speeds.items():
+        assert bodies[name].angular_velocity @ axis == pytest.approx(expected, rel=1e-9)
+
+
 FILE = """
 [shafts]
 one = { length = "300 mm" }

@@ -124,6 +124,17 @@ def test_the_chain_of_a_rigid_coupling_is_the_limit_of_stiff_ones():
     assert rigid.mesh_dynamics["mesh"].mass > near.mesh_dynamics["mesh"].mass
 
 
+def test_a_chain_that_a_drive_holds_whole_has_no_frequencies():
+    joint = RigidCoupling(name="flange", first="motor", second="in")
+    train = line(joint)
+    held = Drivetrain(
+        "held", shafts=train.shafts[:2], couplings=[joint], bearings=train.bearings[:2], drives=train.drives
+    )
+    chain = held.torsional()
+    assert chain.frequencies().size == chain.damping_ratios().size == 0
+    assert "1 inertias" in repr(chain)
+
+
 def vars_of(train):
     """Return the parts of a drivetrain, by group."""
     groups = ("shafts", "wheels", "meshes", "couplings", "bearings", "loads")

@@ -257,7 +257,10 @@ def joint_statement(joint: Joint) -> str:
         return "JPRIM"
     table = {"coupler": "COUPLER", "rotation": "MOTION", "translation": "MOTION", "distance": "GCON"}
     if joint.kind not in table:
-        raise ModelError(f"joint '{joint.name}': its kind {joint.kind} has no form in an ADAMS deck")
+        raise ModelError(
+            f"joint '{joint.name}': its kind {joint.kind} has no form in an ADAMS deck; write the deck without it and "
+            "add the statement of a joint that holds as much"
+        )
     return table[joint.kind]
 
 

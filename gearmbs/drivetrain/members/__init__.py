@@ -1,1 +1,1 @@
-"""Members of planetary stages that deform."""
+"""Members of planetary stages: carriers that deform, and pins."""
