@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError
+from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError, UniversalJoint
 from gearmbs.drivetrain.kinematics import RPM
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage
 from gearmbs.gears.geometry import turn_z
@@ -345,6 +345,10 @@ def mesh_orders(train: Drivetrain, harmonics: int = 2) -> dict[str, float]:
     }
 
 
+SAME_ORDER = 1e-9
+"""Relative difference of orders that are one, as of shafts in a coupling."""
+
+
 def train_campbell(
     train: Drivetrain, speeds: Sequence[Any] | None = None, *, harmonics: int = 2, maximum: float = 2000.0,
     whirl: bool = False,
@@ -359,7 +363,8 @@ def train_campbell(
     speeds : sequence, optional
         Of the first drive, rad/s or text; default 0 to 1.2 of the operating speed.
     harmonics : int
-        Mesh harmonics that excite; where nothing meshes, the shafts do, once a turn, as unbalances excite them.
+        Mesh harmonics that excite; where nothing meshes, the shafts do, once a turn, as unbalances excite them. Shafts
+        behind universal joints with an angle do twice a turn.
     maximum : float
         Modes and crossings up to this frequency, Hz.
     whirl : bool
@@ -383,6 +388,12 @@ def train_campbell(
         for shaft in train.shafts
         if turns(shaft.name) > 0.0
     }
+    for coupling in train.couplings:
+        if isinstance(coupling, UniversalJoint) and coupling.angle and turns(coupling.second) > 0.0:
+            orders[f"2 x {coupling.second}"] = 2.0 * turns(coupling.second) / turns(train.drives[0].shaft)
+    # of what excites at one order the first is named
+    orders = {name: order for k, (name, order) in enumerate(orders.items())
+              if not np.isclose(order, list(orders.values())[:k], rtol=SAME_ORDER).any()}  # fmt: skip
     modes = train_modes(train)
     senses: list[dict[float, str]] = []
 

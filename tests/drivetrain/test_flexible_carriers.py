@@ -253,6 +253,19 @@ def test_a_set_with_a_soft_carrier_runs(body, modes):
     np.testing.assert_allclose(mean, 175.2, rtol=0.05)
 
 
+def test_the_inertia_of_a_carrier_is_about_the_axis():
+    """That of what is off the axis by Steiner."""
+    centred, off = solid(), replace(solid(), positions=solid().positions + [0.02, 0.0, 0.0])
+    mass, moments = FlexibleCarrier(model=centred, hub=HUB, pin=BORE).mass((0.0, ()))
+    _, moved = FlexibleCarrier(model=off, hub=HUB, pin=BORE, at="5 mm").mass((0.0, ()))
+    assert moved[2] - moments[2] == pytest.approx(mass * (shift(off) - shift(centred)), rel=1e-9)
+
+
+def shift(model):
+    """Return the square of the distance of the centre of mass from the axis, m^2."""
+    return float(np.sum(model.mass_properties().com[:2] ** 2))
+
+
 FILE = """
 [shafts]
 sun = { length = "100 mm" }

@@ -22,6 +22,7 @@ from gearmbs.drivetrain import (
 from gearmbs.drivetrain.couplings.even_twist import EvenTwist
 from gearmbs.gears import GearSpec, planetary
 from gearmbs.mechanism import Mechanism
+from gearmbs.studies import train_campbell
 from tests.drivetrain.support import differences, evaluate, frame
 from tests.says import says
 
@@ -313,6 +314,20 @@ def test_members_of_a_differential_start_as_willis_says():
     speeds = {"two": sun, "ring": ring, "out": (24 * sun + 84 * ring) / 108}
     for name, expected in speeds.items():
         assert bodies[name].angular_velocity @ axis == pytest.approx(expected, rel=1e-9)
+
+
+def test_shafts_in_line_excite_once_and_behind_a_joint_twice_a_turn():
+    soft = {"stiffness": "2e3 N m/rad", "first": "one"}
+    plain = line(FlexibleCoupling(name="c", second="two", **soft))
+    assert train_campbell(plain, ["0 rpm", "9000 rpm"], maximum=5e3)["order_name"].values.tolist() == ["1 x one"]
+    three = line(
+        FlexibleCoupling(name="c", second="mid", **soft),
+        UniversalJoint(name="j", first="mid", second="two", angle="10 deg"),
+        shafts=("one", "mid", "two"),
+    )
+    diagram = train_campbell(three, ["0 rpm", "9000 rpm"], maximum=5e3)
+    assert diagram["order_name"].values.tolist() == ["1 x one", "2 x two"]
+    assert diagram["order"].values.tolist() == [1.0, 2.0]
 
 
 FILE = """

@@ -179,7 +179,9 @@ class FlexibleCarrier(Described):
         if self.model is None:
             return own
         found = self.model.properties if isinstance(self.model, ModalModel) else self.model.mass_properties()
-        return float(found.mass), tuple(float(x) for x in np.diag(found.inertia))
+        away = np.asarray(found.com, dtype=float) + [0.0, 0.0, self.at]
+        moments = np.diag(found.inertia) + found.mass * (away @ away - away**2)
+        return float(found.mass), tuple(float(x) for x in moments)
 
     def body(self, name: str, gears: PlanetarySet, own: tuple[float, Any], sense: int = 1) -> ModalModel:
         """Return the carrier as a body with modes, whose seats are its hub and pins.
