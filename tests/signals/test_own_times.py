@@ -33,6 +33,11 @@ def variables(path, times, second):
     scipy.io.savemat(path, {"t_A": TIME, "A": A, "t_B": times, "B": second})
 
 
+def matrices(path, times, second):
+    """A matrix for each channel, times in its first column."""
+    scipy.io.savemat(path, {"A": np.stack([TIME, A], axis=1), "B": np.stack([times, second], axis=1)})
+
+
 def columns(path, times, second):
     table = pd.DataFrame({"Time 1 [s]": TIME, "A [g]": A, "Time 2 [ms]": 1e3 * times, "B [g]": second})
     table.to_csv(path, index=False)
@@ -50,7 +55,7 @@ def frames(path, times, second):
 
 WAYS = {
     groups: "g.h5", structs: "s.mat", variables: "v.mat", columns: "c.csv", numbered_columns: "n.csv",
-    frames: "f.parquet",
+    frames: "f.parquet", matrices: "m.mat",
 }  # fmt: skip
 
 
@@ -68,10 +73,12 @@ def test_channels_with_times_of_their_own_are_refused_and_read_one_by_one(way, c
     names = WRONG[case]
     if way is structs:
         names = tuple(name.replace("A ", "A.x ").replace("B ", "B.x ") for name in names)
+    if way is matrices:
+        names = tuple(name.replace("A ", "A_2 ").replace("B ", "B_2 ") for name in names)
     for given in ({}, {"rate": RATE}, {"gaps": "interpolate"}):
         with pytest.raises(SignalFileError, match=says(*names)):
             read_signal(tmp_path / WAYS[way], **given)
-    alone = read_signal(tmp_path / WAYS[way], channels=["B.x" if way is structs else "B"])
+    alone = read_signal(tmp_path / WAYS[way], channels=[{structs: "B.x", matrices: "B_2"}.get(way, "B")])
     assert alone.attrs["sampling_rate"] == pytest.approx((COUNT - 1) / (times[-1] - times[0]))
     assert float(alone["time"][0]) == pytest.approx(times[0])
     assert line(alone) == pytest.approx(LINE)

@@ -69,7 +69,7 @@ def assemble(
     column_units: dict[str, str] = {}
     owner: dict[str, str] = {}
     notes: list[str] = []
-    abscissa: np.ndarray | None = None
+    abscissas: dict[str, np.ndarray] = {}
     for key, array in arrays.items():
         if key in clocks or array.size < 2:
             continue
@@ -82,7 +82,7 @@ def assemble(
         counts_rows = table.shape[1] > 1 and (channels is None or names[0] not in channels) and rises_evenly(first)
         if counts_rows:
             numbered = bool(np.all(np.diff(first) == 1.0))
-            abscissa = abscissa if numbered or clocks else first
+            abscissas |= {} if numbered or clocks else {key: first}
             said_of = "numbers the rows and is left out" if numbered else "rises evenly; it is taken for the time in s"
             notes.append(f"The first column of {key} {said_of}.")
         for i, name in enumerate(names):
@@ -95,6 +95,7 @@ def assemble(
     own: dict[str, np.ndarray] = {}
     for name, key in owner.items():
         times = _clock_of(path, name, _own_times(key, columns[name].size, clocks, homes), given)
+        times = abscissas.get(key) if times is None else times
         if times is not None and times.dtype.kind in "fiu":
             own[name] = times
     for name, key in owner.items():
@@ -119,7 +120,7 @@ def assemble(
     fast = {name: own[name] for name in columns if name in own and name not in slow}
     checked_same(path, fast)
     t0 = 0.0
-    times = next(iter(fast.values()), abscissa)
+    times = next(iter(fast.values()), next(iter(abscissas.values()), None))
     if times is not None and times.size == next(iter(lengths.values())) and times.dtype.kind in "fiu":
         t0 = float(times[0])
         rate, said = _rate_beside_times(path, rate, times, given)
