@@ -234,3 +234,25 @@ def test_days_without_a_unit_are_asked_for_and_with_one_read(first, tmp_path):
         assert read_signal(tmp_path / name, **given).attrs["sampling_rate"] == pytest.approx(RATE)
     pd.DataFrame({"t": 45363.42 + TIME, "a": A}).to_csv(tmp_path / "s.csv", index=False)
     assert read_signal(tmp_path / "s.csv").attrs["sampling_rate"] == pytest.approx(RATE)
+
+
+LVM = ["LabVIEW Measurement", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tMulti", "***End_of_Header***"]
+
+
+@pytest.mark.parametrize("case", [None, *CASES])
+@pytest.mark.parametrize("increment", [False, True])
+def test_columns_of_times_in_lvm_are_those_of_the_channels_behind_them(case, increment, tmp_path):
+    times = TIME if case is None else CASES[case]
+    told = [f"X0\t0.0\t0.0\t{times[0]}", f"Delta_X\t{TIME[1]}\t{TIME[1]}\t{times[1] - times[0]}"] if increment else []
+    rows = [f"{t:.6f}\t{a}\t{-a}\t{own:.6f}\t{a}" for t, a, own in zip(TIME, A, times, strict=True)]
+    head = ["Channels\t3", *told, "***End_of_Header***", "X_Value\tA\tC\tX_Value\tB\tComment"]
+    (tmp_path / "m.lvm").write_text("\n".join([*LVM, *head, *rows]) + "\n")
+    if case is None:
+        signal = read_signal(tmp_path / "m.lvm")
+        assert (signal.sizes["channel"], signal.attrs["sampling_rate"]) == (3, pytest.approx(RATE))
+    else:
+        with pytest.raises(SignalFileError, match=says(*WRONG[case])):
+            read_signal(tmp_path / "m.lvm")
+        alone = read_signal(tmp_path / "m.lvm", channels=["B"])
+        assert alone.attrs["sampling_rate"] == pytest.approx(1.0 / (times[1] - times[0]))
+        assert float(alone["time"][0]) == pytest.approx(times[0])

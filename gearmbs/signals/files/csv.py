@@ -519,7 +519,7 @@ def _is_text(head: bytes) -> bool:
 def _format(packed: bool, contents: dict[str, Content], also: tuple[str, ...] = ()) -> Format:
     def read(path: Path, asked: Asked) -> Record:
         if asked.content == "lvm":
-            return read_lvm(path, asked.rate)
+            return read_lvm(path, asked.rate, asked.channels)
         return read_csv(path, packed, asked.progress, asked.rate, asked.gaps, asked.pulses, asked.channels)
 
     def pieces(path: Path, asked: Asked) -> Iterator[tuple[Record, float]] | None:

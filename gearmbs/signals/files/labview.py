@@ -6,6 +6,7 @@ import json
 import logging
 import math
 import struct
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.encodings import decoded
+from gearmbs.signals.files.own_clocks import checked_same
 from gearmbs.signals.files.table import Content, Format, begins_with
 from gearmbs.signals.signal.labels import SLOW_ROLES, SLOW_SAID, role_of, tells_time
 from gearmbs.signals.signal.record import (
@@ -23,7 +25,6 @@ from gearmbs.signals.signal.record import (
     chosen_rate,
     rate_by_times,
     rate_candidates,
-    rate_from_times,
     same_rate,
     same_start,
     speed_of,
@@ -41,8 +42,8 @@ OF_FREQUENCY = ("hz", "khz", "rpm")
 """Units of the abscissa of what is no record over time."""
 
 
-def read_lvm(path: Path, rate: float | None = None) -> Record:
-    """Read all segments of a LabVIEW measurement file, one behind the other.
+def read_lvm(path: Path, rate: float | None = None, channels: Sequence[str] | None = None) -> Record:
+    """Read all segments of a LabVIEW measurement file, or their `channels`, one behind the other.
 
     Raises
     ------
@@ -59,7 +60,9 @@ def read_lvm(path: Path, rate: float | None = None) -> Record:
     head = _pairs(lines[: ends[0]], separator)
     decimal = (head.get("Decimal_Separator") or ["."])[0] or "."
     starts = ends[1:] or ends[:1]
-    parts = [_segment(path, lines, starts, i, ends[0], separator, decimal, head, rate) for i in range(len(starts))]
+    parts = [
+        _segment(path, lines, starts, i, ends[0], separator, decimal, head, rate, channels) for i in range(len(starts))
+    ]
     first = parts[0]
     notes = []
     for part in parts[1:]:
@@ -84,6 +87,7 @@ def _segment(
     decimal: str,
     file_head: dict[str, list[str]],
     given: float | None,
+    channels: Sequence[str] | None,
 ) -> Record:
     """The segment whose header ends at line ``starts[index]``."""
     begin = starts[index]
@@ -107,11 +111,7 @@ def _segment(
         cells = line.split(separator)
         try:
             values = [float(cells[i].replace(decimal, ".")) if cells[i].strip() else math.nan for i in kept]
-            times.append(
-                float(cells[x_columns[0]].replace(decimal, "."))
-                if x_columns and cells[x_columns[0]].strip()
-                else math.nan
-            )
+            times.append([float(cells[i].replace(decimal, ".")) if cells[i].strip() else math.nan for i in x_columns])
         except (ValueError, IndexError):
             raise SignalFileError(
                 path, f"line {number} does not hold {len(kept)} numbers: {line.strip()[:60]!r}"
@@ -120,16 +120,28 @@ def _segment(
     if not rows or not kept:
         raise SignalFileError(path, f"its segment {index + 1} holds no samples")
     names = [labels[i] for i in kept]
-    steps = [_number(text, decimal) for text in head.get("Delta_X", [])]
-    rates = {name: 1.0 / step if step else None for name, step in zip(names, steps)}
+    chosen = [k for k, name in enumerate(names) if channels is None or name in channels] or list(range(len(names)))
+    # where each channel has a column of times, empty cells stand for these
+    steps, offsets = (
+        dict(zip(names, [_number(text, decimal) for text in head.get(key, []) if text])) for key in ("Delta_X", "X0")
+    )
+    rates = {names[k]: 1.0 / step if (step := steps.get(names[k])) else None for k in chosen}
     rate = same_rate(path, rates)
-    clock = np.asarray(times)
-    if rate is None and clock.size > 1 and np.isfinite(clock).all() and given is None:
-        rate = rate_from_times(clock, path)
-    units = [unit or UNKNOWN_UNITS for unit in head.get("Y_Unit_Label", [])]
-    units = [units[i] if i < len(units) else UNKNOWN_UNITS for i in range(len(names))]
-    t0 = _number((head.get("X0") or ["0"])[0], decimal) or 0.0
-    return Record(np.asarray(rows), names, units, rate, t0)
+    begins = {names[k]: start for k in chosen if (start := offsets.get(names[k])) is not None}
+    same_start(path, begins, rate)
+    t0 = next(iter(begins.values()), 0.0)
+    clocks = np.asarray(times)
+    if rate is None and x_columns and len(rows) > 1 and np.isfinite(clocks).all():
+        own = {names[k]: clocks[:, max(0, bisect_right(x_columns, kept[k]) - 1)] for k in chosen}
+        checked_same(path, own)
+        first = next(iter(own.values()))
+        rate = rate_by_times(first, path, given)
+        t0 = t0 if begins else float(first[0])
+    labelled = head.get("Y_Unit_Label", [])
+    filled = [unit for unit in labelled if unit]
+    units = filled if len(filled) == len(names) else [unit or UNKNOWN_UNITS for unit in labelled]
+    units = [units[k] if k < len(units) else UNKNOWN_UNITS for k in chosen]
+    return Record(np.asarray(rows)[:, chosen], [names[k] for k in chosen], units, rate, t0)
 
 
 def _segment_header(lines: list[str], end: int) -> int:
@@ -397,7 +409,7 @@ def _library(path: Path) -> Any:
 
 FORMATS = {
     "lvm": Format(
-        read=lambda path, asked: read_lvm(path, asked.rate),
+        read=lambda path, asked: read_lvm(path, asked.rate, asked.channels),
         contents={
             "lvm": Content(
                 "a LabVIEW measurement",
