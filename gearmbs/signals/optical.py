@@ -58,6 +58,9 @@ SAME = 1e-9
 FLAT_SHARE = 6.0
 """How many times as many samples are at the highest value as a step below, or at any other: of a sine in steps it is
 2.4. So seven samples tell of a range, where no other value recurs."""
+COARSE = 64
+"""Values of a record below which it may stand at one because vibration is flat within a step: at the end of a range it
+is cut off at some slope."""
 ISLAND = 3
 """Half the samples between two lost ones that are bridged with them: a bridge that has to lead through one wrong sample
 follows it."""
@@ -242,9 +245,21 @@ def flat_top(column: np.ndarray) -> tuple[float, int] | None:
         if sum(b - a >= FLAT for a, b in _stretches(at)) >= FLAT_TOPS:
             step = min(top - values[-1], float(np.diff(values).min(initial=np.inf)))
             others = int(counts[values >= top - 1.5 * step].sum())
-        if np.count_nonzero(at) > FLAT_SHARE * others:
+        if np.count_nonzero(at) > FLAT_SHARE * others and not _crept_up(x, at, values, top):
             return float(column[at][0]), int(np.count_nonzero(at))
     return None
+
+
+def _crept_up(x: np.ndarray, at: np.ndarray, values: np.ndarray, top: float) -> bool:
+    """Return whether a record of few values comes to its highest by the next one below: flat within one step of it."""
+    if values.size >= COARSE:
+        return False
+    before = np.flatnonzero(at[1:] & ~at[:-1])
+    after = np.flatnonzero(at[:-1] & ~at[1:]) + 1
+    beside = np.concatenate((x[before], x[after]))
+    return bool(beside.size) and float(np.mean(beside == values[-1])) > 0.5 and top - values[-1] <= 1.5 * float(
+        np.diff(values).min(initial=np.inf)
+    )  # fmt: skip
 
 
 def _known_unit(unit: str) -> bool:
@@ -354,9 +369,14 @@ def _bridged(column: np.ndarray, lost: np.ndarray) -> np.ndarray:
         # gaps farther apart than the memory do not know of each other
         groups = np.split(np.arange(at.size), np.flatnonzero(np.diff(at) > memory) + 1)
         for group in groups:
-            apart = np.abs(at[group][:, None] - at[group][None, :])
-            matrix = np.where(apart <= memory, b[np.minimum(apart, memory) + memory], 0.0)
-            x[at[group]] = scipy.linalg.solve(matrix, -pull[group], assume_a="pos")
+            place = at[group]
+            # of sorted places those within the memory are a band, so that long groups cost by their length
+            width = int((np.searchsorted(place, place + memory, side="right") - 1 - np.arange(place.size)).max())
+            band = np.zeros((width + 1, place.size))
+            for k in range(width + 1):
+                apart = place[k:] - place[: place.size - k]
+                band[width - k, k:] = np.where(apart <= memory, b[np.minimum(apart, memory) + memory], 0.0)
+            x[place] = scipy.linalg.solveh_banded(band, -pull[group])
     return x + mean
 
 

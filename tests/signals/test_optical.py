@@ -26,6 +26,7 @@ from gearmbs.signals import (
     with_metadata,
     write_signal,
 )
+from gearmbs.signals.optical import flat_top
 from gearmbs.signals.rotation.phase import phase_from_speed
 from tests.generators import seed
 from tests.says import says
@@ -255,3 +256,14 @@ def test_a_range_below_the_signal_is_named():
     with pytest.raises(SignalError, match=says("full_scale", "100 %", "0.0")):
         repair_vibrometer(clean, full_scale=0.0)
     np.testing.assert_array_equal(repair_vibrometer(clean, full_scale=1.1 * largest).values, clean.values)
+
+
+@pytest.mark.parametrize("step", [1e-4, 5e-4, 1e-3, 2e-3, 5e-3])
+def test_vibration_that_is_flat_within_a_step_is_not_clipped(step):
+    """Three mesh harmonics whose valleys are flat: of 24 values one had half of all samples, told as a range."""
+    turned = 2.0 * np.pi * 16.0 * np.arange(25600) / 12800.0
+    whole = 1e-2 * np.cos(29 * turned) + 6e-3 * np.cos(58 * turned) + 2e-3 * np.cos(87 * turned)
+    coarse = np.round((whole + 1e-5 * np.random.default_rng(0).standard_normal(whole.size)) / step) * step
+    assert flat_top(coarse) is None
+    if step <= 1e-3:
+        assert flat_top(np.minimum(coarse, 8e-3))[0] == pytest.approx(8e-3)
