@@ -122,7 +122,7 @@ def apply(bound, st, plan, factors, d, shows):
     if not steered:
         for c in range(d.cells.shape[0]):
             d.values[c] = st.rdata[d.cells[c]]
-        loads, jumps, leads = True, False, False
+        loads, jumps, leads, bent = True, False, False, False
         for k in range(d.waiting.shape[0]):
             if d.waiting[k] == 0:
                 continue
@@ -133,14 +133,17 @@ def apply(bound, st, plan, factors, d, shows):
                 _write(d, k)
                 loads &= d.is_input[k] == 1 or d.loads[k] == 1
                 jumps, leads = jumps or jumped, leads or turned
+                for p in range(d.first[k], d.first[k + 1]):
+                    bent |= d.plain[3 * p + 2] != 0
         done = jumps or leads
         if done:
             if not kept:
                 _return_to_coordinates(st, d)
             if not (kept and loads):
                 st.matrix_wanted = True
+            bent |= not loads
             pass_jump_at(d.pass_jump)(
-                bound, st, plan, factors, d.t, y, yp, d.cells, d.values, jumps, leads, kept, -1, 0.0, d.scratch
+                bound, st, plan, factors, d.t, y, yp, d.cells, d.values, jumps, leads, kept, bent, -1, 0.0, d.scratch
             )
             if not kept:
                 forget_changes(st, d)

@@ -44,7 +44,7 @@ WINDOW = 4 * HISTORY
 KINK_MEMORY = 64
 """Steps after a refused one for which derivatives of the solution count as jumping; see `controller.meets_kinks`."""
 
-ANSWER = 4
+ANSWER = 7
 """Vectors of the answer to a change of an input, see `gearmbs.dae.integrators.stepping.jumps`."""
 MAX_NODES = 2 * HISTORY
 """Length of the vectors that hold coefficients of a step."""

@@ -26,6 +26,8 @@ class Change(NamedTuple):
     prescribes: bool
     unsure: bool = False
     """Whether a rate jumps whose effect is not in proportion to it, or changes with the time."""
+    bent: bool = False
+    """Whether derivatives of the equations may change: elements, or expressions that more than one number stands in."""
 
 
 class Settings:
@@ -185,7 +187,7 @@ class Settings:
     def take(self, t: float, end: float) -> Change | None:
         """Return what changes at ``t``, None for nothing; lines that begin there end at ``end``."""
         waiting, before, after = self.waiting, self.held, self.held.copy()
-        loads, jumps, leads, prescribes, unsure = True, False, False, False, False
+        loads, jumps, leads, prescribes, unsure, bent = True, False, False, False, False, False
         ended = [name for name, last in self.led.items() if last <= t and name not in waiting] if self.led else ()
         for name in (*waiting, *ended):
             own = self._own[name]
@@ -201,6 +203,7 @@ class Settings:
                 loads &= own.kind == INPUT or own.loads
                 prescribes |= bool(own.prescribes)
                 jumps, leads, unsure = jumps or jumped, leads or turned, unsure or (turned and name in self.bent)
+                bent |= name in self.bent
             self.led.pop(name, None)
             if slope:
                 self.led[name] = end
@@ -208,4 +211,4 @@ class Settings:
         if not (jumps or leads):
             return None
         self.held = after
-        return Change(self.held, loads, jumps, leads, prescribes, unsure)
+        return Change(self.held, loads, jumps, leads, prescribes, unsure, bent or not loads)

@@ -348,7 +348,7 @@ class HeldRun(Run):
         rows.y[row], rows.yp[row] = value_in(self, self.last_step(), t)
         rows.kept[row] = self.state.rdata[self.state.kept]
 
-    def change(self, point: tuple, cells: np.ndarray, change: tuple[np.ndarray, bool, bool, bool, bool, bool]) -> None:
+    def change(self, point: tuple, cells: np.ndarray, change: tuple[np.ndarray, bool, bool, bool, bool, bool, bool]) -> None:
         """Cut the last step back to a time within it, and go on from there with other numbers in the equations.
 
         Parameters
@@ -357,14 +357,15 @@ class HeldRun(Run):
             The time, and where the values there stand.
         cells : ndarray
             Places in the table of numbers.
-        change : (ndarray, bool, bool, bool, bool, bool)
+        change : (ndarray, bool, bool, bool, bool, bool, bool)
             What is to stand there; whether that only acts as loads do, which leave the matrix as it is; whether
             equations change at the time, and whether the change grows with the time; whether it prescribes a motion,
-            which is nothing here; and whether it is not known what it would have done to the past.
+            which is nothing here; whether it is not known what it would have done to the past; and whether the matrix
+            may change.
         """
         st, kept = self.state, True
         t, rows, row, *_ = point
-        values, loads, jumps, leads, _, unsure = change
+        values, loads, jumps, leads, _, unsure, bent = change
         y, yp = rows.y[row], rows.yp[row]
         if self.last_records.changed_at == st.steps or (self._given is not None and self._given[0] == st.steps):
             last = self.last_step()
@@ -391,6 +392,7 @@ class HeldRun(Run):
             jumps,
             leads,
             kept and not unsure,
+            bent,
             -1,
             0.0,
             self._scratch,

@@ -32,6 +32,7 @@ import numpy as np
 from numba import boolean, float64, int64, types
 
 from gearmbs.dae.integrators.corrector import renew_weights, weighted_max
+from gearmbs.dae.integrators.newton_matrix import RATE_OF_FRESH, evaluate_matrix, factor_matrix
 from gearmbs.dae.integrators.run_state import ANSWER, STATE_TYPE, copy, matrix_at, record_history, rows_from, times_from
 from gearmbs.dae.integrators.step import CLOSE
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
@@ -41,8 +42,11 @@ from gearmbs.kernels.bound import FUNCTIONS_TYPE, unbound
 from gearmbs.kernels.jit import njit
 
 TERMS = ANSWER - 1
-"""Terms of the series at most: with four and six a stiff contact takes the same steps beyond its jumps, with two
-8 % more."""
+"""Terms of the series at most, and of a mode that steps do not resolve as many as the order, see `CONVERGES`."""
+CONVERGES = 0.3
+"""Ratio of a term to the one before up to which more of them than the order are taken. A stiff mode, of which the
+series makes a polynomial of their number, would show in the differences, which such a polynomial of the order does not:
+six terms of a planetary set at order one make its steps three times as many."""
 LARGER = 16.0
 """Ratio of a change to that from which the answer was found up to which it serves: rounding grows with it."""
 LEAST_CHANGE = 1e-200
@@ -63,6 +67,8 @@ DOUBTED = 300.0
 order the answer to a jump is right to a part in some hundreds where contacts open at it: in random torques of 10 N m
 each 0.1 ms on the pair of the paper errors are as small as those of cut steps with 30 and 300, with 3000 four times
 larger."""
+PROBED = 0.01
+"""Part of the time 1/gamma over which it is looked at how a jump changes with what moves: kinks lie beyond it."""
 CHANGED = 1
 LED = 2
 """What `steer` returns, added up."""
@@ -72,12 +78,12 @@ _VEC = float64[::1]
 
 @njit(
     types.void(FUNCTIONS_TYPE, STATE_TYPE, PLAN_TYPE, FACTORS_TYPE, float64, _VEC, _VEC, int64[::1], _VEC, boolean,
-               boolean, boolean, int64, float64, float64[:, ::1]),
+               boolean, boolean, boolean, int64, float64, float64[:, ::1]),
     cache=True,
     nogil=True,
     error_model="numpy",
 )  # fmt: skip
-def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, follows, place, change, g):
+def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, follows, bent, place, change, g):
     """Cut the last step back to ``t``, change numbers of the equations there, and the past along with them.
 
     Parameters
@@ -96,6 +102,8 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
         Whether the equations change at once, b_0, and whether the change grows with the time, b_1.
     follows : bool
         Whether factors and past are of use: else the past is left to the test of the step.
+    bent : bool
+        Whether the matrix may change with what changes, see `_follow_bent`.
     place : int
         Of the one input that changes, -1 where more do.
     change : float
@@ -106,7 +114,6 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
     functions = unbound(bound)
     n = st.y.shape[0]
     landed = _cut(st, t, y, yp)
-    terms = min(max(st.order, 1), TERMS)
     reach = t - times_from(st, 0)[min(st.order + 1, st.n_past - 1)]
     moved = 0.0 if follows else np.inf
     if place >= 0 and not jumps and _foresees(st, place, abs(change), reach):
@@ -117,14 +124,20 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
     known = follows and landed and place >= 0 and jumps != leads and abs(change) * min(theta, 1.0) > LEAST_CHANGE
     serves = known and _answer_serves(st, place, change)
     at = t + theta if leads else t
-    if known and not serves:
+    bends = bent and follows and not known
+    if bends:
+        functions.residual(t, y, yp, st.delta, st.idata, st.rdata, st.work)
+    elif known and not serves:
         functions.residual(at, y, yp, first, st.idata, st.rdata, st.work)
     elif follows and leads and not known:
         functions.residual(t + theta, y, yp, later, st.idata, st.rdata, st.work)
         if jumps:
             functions.residual(t, y, yp, st.delta, st.idata, st.rdata, st.work)
-    for k in range(cells.shape[0]):
-        st.rdata[cells[k]] = values[k]
+    if bends:
+        _exchange(st, cells, values)
+    else:
+        for k in range(cells.shape[0]):
+            st.rdata[cells[k]] = values[k]
     if known:
         if not serves:
             functions.residual(at, y, yp, later, st.idata, st.rdata, st.work)
@@ -133,7 +146,10 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
                 later[i] = (later[i] - first[i]) * per_unit
             _find_answer(st, plan, factors, later, place, change)
             st.residuals += 2
-        moved = _follow_known(st, t, change, d, g, terms, leads)
+        moved = _follow_known(st, t, change, d, g, leads)
+    elif bends:
+        moved = _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g)
+        st.residuals += 4
     elif follows:
         if leads:
             functions.residual(t + theta, y, yp, st.res, st.idata, st.rdata, st.work)
@@ -145,11 +161,11 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
             if leads:
                 for i in range(n):
                     later[i] -= first[i] - st.delta[i]
-            moved = _follow(st, plan, factors, t, first, d, g, terms, False)
+            moved = _follow(st, plan, factors, t, first, d, g, False)
         if leads:
             for i in range(n):
                 later[i] /= theta
-            moved = max(moved, _follow(st, plan, factors, t, later, d, g, terms, True))
+            moved = max(moved, _follow(st, plan, factors, t, later, d, g, True))
         st.residuals += int(jumps) * (1 + int(leads)) + 2 * int(leads)
     if follows and leads and not jumps and place >= 0:
         st.turned, st.turn_moves, st.turn_reach, st.turns_trusted = place, moved / abs(change), reach, 0
@@ -255,6 +271,7 @@ def steer(bound, st, plan, factors, t, y, yp, places, value, end, cells, values,
             jumps,
             leads,
             True,
+            place < 0,
             place,
             value - now if jumps else slope - slope_before,
             g,
@@ -282,7 +299,7 @@ def _foresees(st, place, turn, reach):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _follow(st, plan, factors, t, b, d, g, terms, integrated):
+def _follow(st, plan, factors, t, b, d, g, integrated):
     """Add the answer to a jump ``b`` of the equations, or to one of its rate, to the past and the point at ``t``.
 
     Parameters
@@ -291,10 +308,8 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
         State of the run, and plan and factors of its matrix.
     b : ndarray, shape (n,)
         The jump of the residual.
-    d, g : ndarray, shapes (n,) and (terms, n)
+    d, g : ndarray, shapes (n,) and (TERMS, n)
         Scratch: the answer, and the terms of its series.
-    terms : int
-        Terms of the Laguerre series.
     integrated : int
         Whether the jump is one of the rate.
 
@@ -317,10 +332,12 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
     reach = t - times[min(st.order + int(integrated), st.n_past - 1)]
     scale = reach if integrated else 1.0
     low, high = 1.0, 1.0 + gamma * reach
-    moves, unseen = scale * high * weighted_max(d, w_error), _unseen_turn(st) if integrated else UNSEEN
-    for m in range(terms):
+    size, unseen, terms = weighted_max(d, w_error), _unseen_turn(st) if integrated else UNSEEN, TERMS
+    moves = scale * high * size
+    for m in range(TERMS):
         own, before = g[m], d if m == 0 else g[m - 1]
-        if scale * high * weighted_max(before, w_error) <= unseen:
+        last, size = size, weighted_max(before, w_error)
+        if scale * high * size <= unseen or (m >= st.order and size > CONVERGES * last):
             terms = m
             break
         low, high = high, ((2.0 * m + 3.0 + gamma * reach) * high - (m + 1.0) * low) / (m + 2.0)
@@ -333,6 +350,80 @@ def _follow(st, plan, factors, t, b, d, g, terms, integrated):
             for i in range(n):
                 own[i] = before[i] - delta[i]
     _add_answer(st, t, gamma, d, g, terms, integrated)
+    return moves
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _exchange(st, cells, values):
+    """Exchange what stands in the cells with some values."""
+    rdata = st.rdata
+    for k in range(cells.shape[0]):
+        values[k], rdata[cells[k]] = rdata[cells[k]], values[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _change_beside(functions, st, t, yp, cells, values, now, out):
+    """Write by how much a change of numbers makes more of the residual a little later, at ``st.y_pred``, than ``now``.
+
+    The new numbers are in place, the old ones in ``values``.
+    """
+    old = st.yp_pred
+    functions.residual(t, st.y_pred, yp, out, st.idata, st.rdata, st.work)
+    _exchange(st, cells, values)
+    functions.residual(t, st.y_pred, yp, old, st.idata, st.rdata, st.work)
+    _exchange(st, cells, values)
+    for i in range(out.shape[0]):
+        out[i] -= old[i] + now[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g):
+    """Do what `_follow` does where the jump may depend on the unknowns, as that of a damping or within a dead zone.
+
+    Then the matrix A jumps, too, and along the old solution b_0 grows by a b_1. Both begin to tell with the square of
+    the time: where they do, the answer is found with the new matrix.
+
+    Parameters
+    ----------
+    st
+        With the new numbers in place, the old ones in ``values``, and in ``delta`` what the residual was with them.
+
+    Returns
+    -------
+    moves : float
+        As there, not finite where the new matrix needs other pivots: the past is left as it was then.
+    """
+    n, gamma = st.y.shape[0], st.gamma_factored
+    first, later, jump, at = g[TERMS], g[TERMS + 1], st.yp_between, st.y_pred
+    functions.residual(t, st.y, yp, first, st.idata, st.rdata, st.work)
+    for i in range(n):
+        jump[i] = first[i] - st.delta[i]
+    solve(plan, factors, first, d)
+    for i in range(n):
+        at[i] = st.y[i] + PROBED * (yp[i] / gamma - d[i])
+    _change_beside(functions, st, t + PROBED / gamma, yp, cells, values, jump, later)
+    solve(plan, factors, later, d)
+    st.solves += 2
+    far = 1.0 + gamma * (t - times_from(st, 0)[min(st.order, st.n_past - 1)])
+    moves = 0.0
+    if far * far * weighted_max(d, st.w_error) > PROBED * UNSEEN:
+        for i in range(n):
+            at[i] = st.y[i] + PROBED * yp[i] / gamma
+        _change_beside(functions, st, t + PROBED / gamma, yp, cells, values, jump, later)
+        for i in range(n):
+            later[i] *= gamma / PROBED
+        st.t_seen, st.gamma = t, gamma
+        evaluate_matrix(functions, st)
+        if not factor_matrix(st, plan, factors):
+            st.matrix_wanted = True
+            moves = np.inf
+        else:
+            st.matrix_wanted, st.matrix_age, st.rate = False, 0, RATE_OF_FRESH
+            moves = _follow(st, plan, factors, t, later, d, g, True)
+    if moves < np.inf:
+        moves = max(moves, _follow(st, plan, factors, t, first, d, g, False))
+    for k in range(cells.shape[0]):
+        values[k] = st.rdata[cells[k]]
     return moves
 
 
@@ -379,7 +470,7 @@ def _find_answer(st, plan, factors, b, place, change):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _follow_known(st, t, change, d, g, terms, integrated):
+def _follow_known(st, t, change, d, g, integrated):
     """Do what `_follow` does with the answer at hand, in proportion to a change of the input."""
     n, gamma = st.y.shape[0], st.answer_gamma
     times, w_error = times_from(st, 0), st.w_error
@@ -388,7 +479,7 @@ def _follow_known(st, t, change, d, g, terms, integrated):
     scale = abs(change) * (reach if integrated else 1.0)
     low, high = 1.0, 1.0 + gamma * reach
     unseen = _unseen_turn(st) if integrated else UNSEEN
-    moves = 0.0
+    moves, terms = 0.0, min(max(st.order, 1), TERMS)
     for m in range(terms):
         moved = scale * high * weighted_max(answer[m], w_error)
         if m == 0:
