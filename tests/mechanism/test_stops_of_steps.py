@@ -105,3 +105,27 @@ def test_a_controller_jumps_past_a_stop_at_its_sample():
     np.testing.assert_allclose(sim.solution().state("al"), [0.0, 0.0], atol=1e-12)
     assert (sim.advance(1.0), sim.t) == (None, 1.0)
     np.testing.assert_allclose(sim.get("angular_velocity", "disc"), [0.0, 0.0, 0.7 * 5.0], atol=1e-7)
+
+
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF"])
+def test_a_stop_at_a_point_or_by_rounding_behind_it_is_told_once(integrator):
+    """A clock passes at a time that is asked for, or a few units of its last digit after it, and so do others."""
+    stops = [StopAt("clock", 0.5), StopAt("twice", 1.0), StopAt("back", -0.5)]
+    m = swinging()
+    for name, rate in (("clock", "1"), ("twice", "2"), ("back", "-1")):
+        m.differential_state(name, rate)
+    sim = gm.Simulator(m, 2.0, stops=stops, integrator=integrator)
+    first = sim.advance(1.0)
+    assert first in stops
+    at = sim.t
+    for units in (-3, -1, 0, 1):
+        sim = gm.Simulator(m, 2.0, stops=stops, integrator=integrator)
+        told, t = [], at + units * np.spacing(at)
+        for end in (t, 1.0):
+            while (stop := sim.advance(float(end))) is not None:
+                told.append(stop.state)
+                assert sim.t == pytest.approx(0.5, rel=1e-9)
+                if len(told) == 1:
+                    # what is told goes on from a state too
+                    sim.restore(sim.state())
+        assert sorted(told) == ["back", "clock", "twice"]

@@ -191,3 +191,63 @@ def test_a_state_knows_the_turns_that_something_counts(counted):
     assert gm.Simulator(m, 2.0, initial=state).get("joint_angle", "pin") == pytest.approx(angle, abs=1e-6)
     plant = m.linearize([("torque", "pin")], [("joint_angle", "pin")], at=state)
     assert plant.point.outputs == pytest.approx([angle], abs=1e-6)
+
+
+def under_an_input(level=None):
+    """Return a disc of 2 kg m2 that an input turns: by its torque, or by a motion of a level."""
+    m = Mechanism("disc")
+    body = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    pin = m.revolute("pin", body, m.ground, axis=(0, 0, 1))
+    if level is None:
+        m.torque("drive", body, m.input("u", "N m"))
+    else:
+        m.rotation("drive", pin, m.input("u", "rad" if level == "displacement" else "rad/s"), level=level)
+    m.output("angle", "AZ(pin.I, pin.J)")
+    return m
+
+
+def test_a_controller_sees_the_angle_at_its_samples():
+    """Whatever points are recorded: a sampled position loop is the same as one that advances from sample to sample."""
+    ends = []
+    for points in (1, 25):
+        sim, seen = gm.Simulator(under_an_input(), 0.5), []
+
+        def loop(t, sim, seen=seen):
+            angle = sim.get("joint_angle", "pin")
+            seen.append((angle, sim.get("output", "angle"), sim.get("evaluate", "AZ(pin.I,pin.J)")))
+            return 50.0 * (9.0 - angle) - 20.0 * sim.get("joint_rate", "pin")
+
+        sim.control("u", loop, sample_time=0.02)
+        for t in np.linspace(0.0, 0.5, points + 1)[1:].tolist():
+            sim.advance(t)
+        np.testing.assert_allclose(np.ptp(seen, axis=1), 0.0, atol=1e-12)
+        ends.append(sim.get("joint_angle", "pin"))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+    assert ends[0] > 1.0
+
+
+def test_angles_at_points_that_are_not_recorded():
+    """Under 4 N m, t^2, more than two turns in all."""
+    sim = gm.Simulator(under_an_input(), 4.0)
+    sim.set("u", 4.0)
+    for t, record in ((1.0, False), (2.0, False), (3.0, True), (3.5, False), (4.0, True)):
+        sim.advance(t, record=record)
+        assert sim.get("joint_angle", "pin") == pytest.approx(t * t, abs=1e-5)
+        assert sim.get("output", "angle") == pytest.approx(t * t, abs=1e-5)
+    assert sim.solution().t.tolist() == [0.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("level", "hold", "values", "angles"),
+    [("displacement", 1, (0.0, 0.5, 0.6), (0.0, 0.5, 0.6)), ("velocity", 0, (0.0, 500.0, 1.0), (0.0, 0.5, 0.599))],
+)
+def test_turns_behind_a_jump_of_a_prescribed_speed(level, hold, values, angles):
+    """500 rad/s for a millisecond, then 1 rad/s for 99: the speed before the jump is not one of what follows."""
+    sim = gm.Simulator(under_an_input(level), 0.2)
+    for t, value, angle in zip((0.1, 0.101, 0.2), values, angles, strict=True):
+        sim.set("u", value, hold=hold)
+        sim.advance(t)
+        assert sim.get("joint_angle", "pin") == pytest.approx(angle, abs=1e-6)
+        assert sim.get("output", "angle") == pytest.approx(angle, abs=1e-6)
+    np.testing.assert_allclose(sim.solution().joint_angle("pin")[1:], angles, atol=1e-6)
+    np.testing.assert_allclose(sim.solution().output("angle")[1:], angles, atol=1e-6)

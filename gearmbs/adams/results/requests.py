@@ -17,7 +17,7 @@ from gearmbs.dae.equations.expressions import eval_gradient
 from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_R, ExpressionError
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.dae.equations.kinematics import AXES as ANGLE_NAMES
-from gearmbs.dae.results.frames import frame_motion, known_turns
+from gearmbs.dae.results.frames import frame_motion, known_turns, rows_of_jumps
 from gearmbs.dae.results.solution import Solution
 from gearmbs.kernels.jit import njit
 from gearmbs.mechanism.compile import scope_of, starting_angles
@@ -150,10 +150,11 @@ class RequestEvaluator:
         named = [(function, self._marker_named(i), self._marker_named(j)) for function, i, j in tape.angles]
         known = [known_turns(self.solution, *names, self.model.mechanism.turns.get(names)) for names in named]
         with raised_errors(self.model.mechanism.functions.values()):
+            t, jumps = self.solution.t, rows_of_jumps(self.solution.t, self.solution.jumped)
             return expression_values(
-                tape, starts, known, self.solution.t, self.kin, self.acc, self.marker_body, self.marker_frame, y,
+                tape, starts, known, t, jumps, self.kin, self.acc, self.marker_body, self.marker_frame, y,
                 self._marker_named,
-            )  # fmt: skip
+            )[0]  # fmt: skip
 
     def variables(self) -> dict[int, np.ndarray]:
         """Return the values of the deck's VARIABLEs over time, but for those that ask for what is not there."""

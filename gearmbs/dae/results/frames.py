@@ -252,12 +252,33 @@ SPLINE_POINTS = 4
 """Outputs from which a cubic spline says more about a speed than its mean between two of them."""
 
 
-def warn_of_doubtful_turns(t: np.ndarray, angle: np.ndarray, speed: np.ndarray, label: str) -> None:
+def rows_of_jumps(t: np.ndarray, jumped: frozenset[float]) -> np.ndarray:
+    """Return which of some times are among those at which velocities have jumped."""
+    return np.array([one in jumped for one in t.tolist()], dtype=bool) if jumped else np.zeros(t.size, dtype=bool)
+
+
+def mean_speeds(speed: np.ndarray, jumps: np.ndarray) -> np.ndarray:
+    """Return the mean of the speeds at both ends of each interval; behind a jump the speed at its end is all there is.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (m,)
+        Where it jumps, that before.
+    jumps : ndarray of bool, shape (m,)
+
+    Returns
+    -------
+    ndarray, shape (m - 1,)
+    """
+    return np.where(jumps[:-1], speed[1:], 0.5 * (speed[1:] + speed[:-1]))
+
+
+def warn_of_doubtful_turns(t: np.ndarray, angle: np.ndarray, speed: np.ndarray, jumps: np.ndarray, label: str) -> None:
     """Warn where a spline through the speeds makes another number of turns between two outputs than was counted."""
-    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
-    if t.size < SPLINE_POINTS:
+    steps = mean_speeds(speed, jumps) * np.diff(t)
+    if t.size < SPLINE_POINTS or jumps.any():
         # speeds between those at both ends lead so far off their mean
-        off = 0.5 * np.abs(np.diff(speed)) * np.diff(t)
+        off = np.where(jumps[:-1], 0.0, 0.5 * np.abs(np.diff(speed)) * np.diff(t))
     else:
         off = np.abs(np.diff(angle) - _finer_steps(t, speed, steps))
     doubtful = np.flatnonzero(off > np.pi)

@@ -88,6 +88,8 @@ class Solution(Measured, Shown):
     inside : mapping of float
         Of the start and the end of a run, s, times next to them within it. A table or an expression may begin or end
         there: accelerations, reactions and loads that jump at an end are those of the inside.
+    jumped : frozenset of float
+        Output times at which velocities have jumped, s: those told there are the ones before.
     initial : State or None
         The state that the run started in, if it was given one.
     given : ndarray of int or None
@@ -106,6 +108,7 @@ class Solution(Measured, Shown):
     }
 
     inside: Mapping[float, float] = MappingProxyType({})
+    jumped: frozenset[float] = frozenset()
     at_steps: Mapping[tuple[str, str], Any] = MappingProxyType({})
     """What is read of the integrator's own steps instead of evaluated, by method and name; see `watched.Watch`."""
 

@@ -13,12 +13,12 @@ from gearmbs.kernels.jit import njit
 
 
 @njit(
-    "void(int64[::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1],"
+    "void(int64[::1], float64[::1], float64[::1], boolean[::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1],"
     " float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1])",
     cache=True,
     nogil=True,
 )
-def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, angles, known, grad, work, out):
+def evaluate_series(ints, floats, t, jumps, kin, acc, marker_body, marker_frame, y, angles, known, grad, work, out):
     """Evaluate a tape at every time.
 
     Counted angles are those nearest to what is known of them; others go on by the mean of their rates at both ends of
@@ -32,6 +32,8 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
         Real table of the expression (`Tape.floats`).
     t : ndarray
         Times, s.
+    jumps : ndarray of bool
+        Where velocities jump: those at hand are the ones before.
     kin : ndarray, shape (times, bodies, KIN_COLUMNS)
         Positions, orientations and velocities of the bodies.
     acc : ndarray, shape (times, bodies, 6)
@@ -60,7 +62,8 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
         angle_rates(ints, floats, t[k], kin[k], marker_body, marker_frame, y[k], ref, rates, grad, work)
         if k > 0:
             for a in range(ref.size):
-                ref[a] += 0.5 * (rates[a] + angles[1, k - 1, a]) * (t[k] - t[k - 1])
+                before = rates[a] if jumps[k - 1] else angles[1, k - 1, a]
+                ref[a] += 0.5 * (rates[a] + before) * (t[k] - t[k - 1])
         for a in range(known.shape[0]):
             if not np.isnan(known[a, k]):
                 ref[a] = known[a, k]
@@ -70,17 +73,18 @@ def evaluate_series(ints, floats, t, kin, acc, marker_body, marker_frame, y, ang
 
 def expression_values(
     tape: Tape,
-    starts: Sequence[float],
+    starts: Sequence[float] | np.ndarray,
     known: Sequence[np.ndarray],
     t: np.ndarray,
+    jumps: np.ndarray,
     kin: np.ndarray,
     acc: np.ndarray,
     marker_body: np.ndarray,
     marker_frame: np.ndarray,
     y: np.ndarray,
     marker_named: Callable[[int], str],
-) -> np.ndarray:
-    """Return the values of a tape at every time; warn where its angles may be full turns off.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the values of a tape at every time, and its angles at the last; warn where they may be full turns off.
 
     Parameters
     ----------
@@ -89,20 +93,22 @@ def expression_values(
         Near which its counted angles start, rad.
     known : sequence of ndarray, shape (times,)
         What the run has counted of each, see `gearmbs.dae.results.frames.known_turns`.
-    t, kin, acc, marker_body, marker_frame, y : ndarray
+    t, jumps, kin, acc, marker_body, marker_frame, y : ndarray
         As of `evaluate_series`.
     marker_named : callable
         Name of a marker by its index.
 
     Returns
     -------
-    ndarray, shape (times,)
+    values : ndarray, shape (times,)
+    ends : ndarray, shape (counted angles,)
+        rad.
     """
     angles = np.zeros((2, t.size, max(1, tape.n_angles)))
     angles[0, :1, : tape.n_angles] = starts
     known_angles, out = np.array(known).reshape(len(known), t.size), np.zeros(t.size)
     evaluate_series(
-        tape.ints, tape.floats, t, kin, acc, marker_body, marker_frame, y, angles, known_angles,
+        tape.ints, tape.floats, t, jumps, kin, acc, marker_body, marker_frame, y, angles, known_angles,
         np.zeros(max(1, tape.gradient_size)),
         np.zeros(tape.work_size), out,
     )  # fmt: skip
@@ -110,5 +116,5 @@ def expression_values(
         if not np.isnan(known_angles[k]).any():
             continue
         label = f"{function}({marker_named(i)}, {marker_named(j)})"
-        warn_of_doubtful_turns(t, angles[0, :, k], angles[1, :, k], label)
-    return out
+        warn_of_doubtful_turns(t, angles[0, :, k], angles[1, :, k], jumps, label)
+    return out, angles[0, -1, : tape.n_angles].copy()

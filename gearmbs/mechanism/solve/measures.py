@@ -12,7 +12,15 @@ from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.model.model import Names
 from gearmbs.dae.problem import ModelError
-from gearmbs.dae.results.frames import body_motion, elastic_motion, frame_motion, known_turns, warn_of_doubtful_turns
+from gearmbs.dae.results.frames import (
+    body_motion,
+    elastic_motion,
+    frame_motion,
+    known_turns,
+    mean_speeds,
+    rows_of_jumps,
+    warn_of_doubtful_turns,
+)
 from gearmbs.mechanism.parts.bodies import Body, Marker, markers_kept
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.inputs import Output
@@ -49,7 +57,8 @@ class Measures:
         ai, aj = self._axes(found.i), self._axes(found.j)
         wanted = np.arctan2(_dot(ai[:, :, 0], aj[:, :, 1]), _dot(ai[:, :, 0], aj[:, :, 0]))
         speed = _dot(self._spin(found.i) - self._spin(found.j), aj[:, :, 2])
-        steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(t)
+        jumps = rows_of_jumps(t, self.solution.jumped)
+        steps = mean_speeds(speed, jumps) * np.diff(t)
         known = known_turns(
             self.solution, "AZ", found.i.name, found.j.name,
             self.mechanism.turns.get(("AZ", found.i.name, found.j.name)),
@@ -61,7 +70,7 @@ class Measures:
         turns = np.round(rest / (2 * np.pi))
         start = wanted[0] + 2 * np.pi * np.round((np.nan_to_num(known[0], nan=wanted[0]) - wanted[0]) / (2 * np.pi))
         angle = start + np.concatenate([[0.0], np.cumsum(steps + rest - 2 * np.pi * turns)])
-        warn_of_doubtful_turns(t, angle, speed, f"joint '{found.name}'")
+        warn_of_doubtful_turns(t, angle, speed, jumps, f"joint '{found.name}'")
         return angle
 
     def displacement(self, joint: Joint | str) -> np.ndarray:
@@ -230,6 +239,10 @@ class Measures:
 
     def expression(self, text: str) -> np.ndarray:
         """Return the values of an expression, in the mechanism's units, shape (m,)."""
+        return self.counted_expression(text, None)[0]
+
+    def counted_expression(self, text: str, starts: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the same and the angles counted in it at the end, which may start near some others (rad)."""
         from gearmbs.mechanism.compile import scope_of, starting_angles
         from gearmbs.mechanism.language.library import compile_expression
         from gearmbs.mechanism.language.series import expression_values
@@ -247,10 +260,12 @@ class Measures:
         bodies = np.array(builder.marker_body, dtype=np.int64)
         frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
         kin, acc = frame_motion(self.solution.evaluated, builder.build(Names()))
-        starts = starting_angles(tape, self.mechanism.turns, marker_named)
+        if starts is None:
+            starts = np.array(starting_angles(tape, self.mechanism.turns, marker_named))
         named = [(f, marker_named(i), marker_named(j)) for f, i, j in tape.angles]
         known = [known_turns(self.solution, *names, self.mechanism.turns.get(names)) for names in named]
-        return expression_values(tape, starts, known, t, kin, acc, bodies, frames, y, marker_named)
+        jumps = rows_of_jumps(t, self.solution.jumped)
+        return expression_values(tape, starts, known, t, jumps, kin, acc, bodies, frames, y, marker_named)
 
     def _unknown(self, key: tuple) -> np.ndarray:
         if key[0] in ("diff", "variable"):

@@ -181,6 +181,8 @@ class Restored(Told):
         elif self._unmet:
             self._unmet = []
         self.__dict__["_plain"] = self._is_plain()
+        if self._jumped:
+            self._jumped = [t for t in self._jumped if t <= self.t]
 
     def _begin_in(self, state: State) -> None:
         """Make a run that starts in a state; raise a ModelError, and stay where it was, if it cannot."""

@@ -206,6 +206,8 @@ class Simulator(Sampled, Restored, Guessed):
         self.numbers = MappingProxyType({**numbers} | {alias: numbers[name] for alias, name in aliases.items()})
         self._settings = Settings(numbers, aliases, {**mechanism.bodies, **mechanism.elements})
         self._simulated, self._took, self._since = 0.0, 0.0, 0.0
+        self._jumped: list[float] = []
+        """Times at which velocities have jumped with what motions prescribe."""
         vars(self)["t"] = 0.0
         self._given = np.empty(0, dtype=np.int64)
         self._begin(initial)
@@ -243,7 +245,8 @@ class Simulator(Sampled, Restored, Guessed):
         self._row.share(1)
         self._next_look = problem.t0 if self._system.has_dropped_rows else np.inf
         self._points: list[Point] = []
-        self._counted: dict[tuple, tuple[int, float]] = {}
+        self._counted: dict[Any, tuple[Point, Any]] = {}
+        """Points at which angles have last been counted, and what they were."""
         self._failed: str | None = None
         self._passed: StopAt | None = None
         """The one of ``stops`` that a jump at the present time has passed, not told yet."""
@@ -321,6 +324,7 @@ class Simulator(Sampled, Restored, Guessed):
                 return stop
             if self._stops and (hit := self._crossing(end)) is not None:
                 self._go_to(hit[0], record)
+                self._run.tell(hit)
                 return self._stops[hit[1]]
             self._go_to(end, record and end == t)
         own["_plain"] = self._is_plain()
@@ -500,7 +504,10 @@ class Simulator(Sampled, Restored, Guessed):
             return
         led = settings.on_the_way(self.t)
         if led is not None:
-            raise ModelError(f"state: {led!r} is on its way to a value; take the state before set, or after advance")
+            raise ModelError(
+                f"state: {led!r} is on its way to a value; take the state before set, or after the advance to its end; "
+                f"at a stop on the way set({led!r}, sim.get('input', {led!r})) holds it"
+            )
         if settings.waiting:
             self._apply(self.t)
 
@@ -521,6 +528,8 @@ class Simulator(Sampled, Restored, Guessed):
         before = run.event_values(own["_point"]) if own["_stops"] and own["t"] > own["_t_start"] else None
         if change.prescribes or change.unsure or not run.state.steps:
             self._start_with(change.values)
+            if change.prescribes:
+                self._jumped.append(own["t"])
         else:
             began = perf_counter()
             with raised_errors(self._functions) if self._functions else NOTHING:
@@ -579,12 +588,14 @@ class Simulator(Sampled, Restored, Guessed):
             # the first point is one with what is set before the start, whatever a state has begun
             y = settle_states(self._base.residual, point.t, run.problem.y0, run.problem.yp0, *tables)
             yp = run.problem.yp0
+        told = run.told
         self._begin(State.of(self._base, point.t, y, yp, tables), repair=True)
         self._settings.led = led
         if begun:
             self._problem, self._origin = first
             self._points = points
             self._point = point
+            self._run.told = told
 
     def __repr__(self) -> str:
         name = self._system.mechanism.name if self._system.mechanism is not None else "mechanism"

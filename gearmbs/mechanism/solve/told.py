@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from inspect import Signature, signature
+from operator import itemgetter
 from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
@@ -84,7 +86,8 @@ class Told(OwnAttributes):
     _point: Point
     _present: Solution | None
     _points: list[Point]
-    _counted: dict[tuple, tuple[int, float]]
+    _counted: dict[Any, tuple[Point, Any]]
+    _jumped: list[float]
     _records: bool
     _failed: str | None
     _origin: State | None
@@ -155,7 +158,7 @@ class Told(OwnAttributes):
         if what == "joint_angle":
             return self._joint_angle(*names)
         if what == "evaluate" and COUNTED_FUNCTION.search(str(names[:1])):
-            return float(self.solution().evaluate(*names)[-1])
+            return self._evaluated(*names)
         if what == "transmission_error":
             return _last(self._mechanism.measures(self._now()).transmission_error(*names))
         found = getattr(self._now(), what)
@@ -178,11 +181,35 @@ class Told(OwnAttributes):
     def _joint_angle(self, joint: Any) -> float:
         """Return the angle of a joint, counted from the point on at which it was last asked for."""
         self._check_records("joint_angle")
-        first, value = self._counted.get(joint, (0, None))
-        angle = self._over(first).joint_angle(joint)
+        after, value = self._counted.get(joint, (None, None))
+        path = self._path(after)
+        angle = self._over(path).joint_angle(joint)
         last = float(angle[-1] if value is None else value + (angle[-1] - angle[0]))
-        self._counted[joint] = len(self._points) - 1, last
+        self._counted[joint] = path[-1], last
         return last
+
+    def _evaluated(self, text: str) -> float:
+        """Return an expression whose angles are counted from the point on at which it was last asked for."""
+        self._check_records("evaluate")
+        after, starts = self._counted.get(("evaluate", text), (None, None))
+        path = self._path(after)
+        values, ends = self._mechanism.measures(self._over(path)).counted_expression(text, starts)
+        self._counted["evaluate", text] = path[-1], ends
+        return float(values[-1])
+
+    def _path(self, after: Point | None) -> list[Point]:
+        """Return the points kept behind an earlier one, and the present one, which need not be among them.
+
+        Sample times of controllers are none, nor are points that are not to be recorded: their values are copied, since
+        the next one is written over them.
+        """
+        points, point = self._points, self._point
+        path = points[:] if after is None else [after, *points[bisect_right(points, after.t, key=itemgetter(0)) :]]
+        if not path or path[-1].t != point.t:
+            rows, row = point.rows, point.row
+            own = Rows(*(column[row : row + 1].copy() for column in rows))
+            path.append(Point(point.t, own, 0, point.idata, point.held))
+        return path
 
     def solution(self, first: int = 0) -> Solution:
         """Return the motion and forces over all points so far, from the start on or from the one with a number.
@@ -193,7 +220,7 @@ class Told(OwnAttributes):
             If no records are kept.
         """
         self._check_records("solution")
-        return self._over(first)
+        return self._over(self._points[first:])
 
     def _places_given(self) -> np.ndarray:
         """Return the places of numbers that have been set, here or in the state that it goes on from."""
@@ -208,9 +235,8 @@ class Told(OwnAttributes):
         if not self._records:
             raise ModelError(f"{what}: it needs the points so far; make the simulator with records=True")
 
-    def _over(self, first: int) -> Solution:
-        """Return the solution over the points from one on."""
-        points = self._points[first:]
+    def _over(self, points: list[Point]) -> Solution:
+        """Return the solution over some points."""
         t, rows, places, tables, held = zip(*points, strict=True)
         y, yp, counted = (
             np.array([getattr(r, name)[k] for r, k in zip(rows, places, strict=True)]) for name in ("y", "yp", "kept")
@@ -228,7 +254,7 @@ class Told(OwnAttributes):
         )  # fmt: skip
         solution = Solution(self._system, self._problem, result, self._members, self._remark)
         solution.initial, solution.given = self._origin, self._places_given()
-        solution.inside = self._row.inside
+        solution.inside, solution.jumped = self._row.inside, frozenset(self._jumped)
         return solution
 
 

@@ -140,6 +140,8 @@ class HeldRun(Run):
         self.itself = ref(self)
         self.crossings: list[tuple[float, int]] = []
         """Times and events in the last step."""
+        self.told = dict.fromkeys(range(self.state.n_events), float(problem.t0))
+        """Times at which crossings of each event have last been told; what passes at the start has done so before."""
         self._errors = options.errors
         self._watched = self._quick = False
         """Whether ``stall`` may have noted something; whether nothing but steps may come on the way to a time."""
@@ -285,9 +287,21 @@ class HeldRun(Run):
         st.n_crossings = 0
 
     def crossing(self, after: float, until: float) -> tuple[float, int] | None:
-        """Return time and event of the first crossing of the last step in a span, None for none."""
-        ahead = [one for one in self.crossings if after + ROUNDED * abs(after) < one[0] <= until]
+        """Return time and event of the first crossing of the last step in a span that is not told yet, None for none.
+
+        Others may have been told at its very time, or a point that lies before it by no more than rounding.
+        """
+        early = after - ROUNDED * abs(after)
+        ahead = [(max(at, after), e) for at, e in self.crossings if early <= at <= until and not self._is_told(at, e)]
         return min(ahead, default=None)
+
+    def tell(self, crossing: tuple[float, int]) -> None:
+        """Note that a crossing has been told."""
+        self.told[crossing[1]] = crossing[0]
+
+    def _is_told(self, at: float, event: int) -> bool:
+        last = self.told.get(event)
+        return last is not None and abs(at - last) <= ROUNDED * abs(at)
 
     def _find_crossings(self, t: float) -> None:
         """Find those behind a time in the last step, of which another run has told nothing."""
@@ -402,7 +416,7 @@ class HeldRun(Run):
         self._given, self._jumped = None, (int(st.steps), t, rows, row)
         if self.problem.events is not None and st.n_events:
             fired = [e for at, e in self.crossings if at == t]
-            self.crossings.clear()
+            self.crossings = [(at, e) for at, e in self.crossings if at == t and not self._is_told(at, e)]
             self.problem.events(t, st.y, st.yp, st.g_old, st.idata, st.rdata, st.work)
             # what has just passed does so once
             st.g_old[fired] = 0.0
@@ -504,6 +518,7 @@ class HeldRun(Run):
         self.table = held.table if given is None else given.idata
         if self.crossings or held.crossings:
             self.crossings = list(held.crossings)
+        self.told = dict(held.told)
         self._stand(False)
         return rows, row
 

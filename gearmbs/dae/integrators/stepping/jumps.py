@@ -332,12 +332,12 @@ def _follow(st, plan, factors, t, b, d, g, integrated):
     reach = t - times[min(st.order + int(integrated), st.n_past - 1)]
     scale = reach if integrated else 1.0
     low, high = 1.0, 1.0 + gamma * reach
-    size, unseen, terms = weighted_max(d, w_error), _unseen_turn(st) if integrated else UNSEEN, TERMS
-    moves = scale * high * size
+    unseen, terms = _unseen_turn(st) if integrated else UNSEEN, TERMS
+    moves = scale * high * weighted_max(d, w_error)
     for m in range(TERMS):
         own, before = g[m], d if m == 0 else g[m - 1]
-        last, size = size, weighted_max(before, w_error)
-        if scale * high * size <= unseen or (m >= st.order and size > CONVERGES * last):
+        size = weighted_max(before, w_error)
+        if scale * high * size <= unseen:
             terms = m
             break
         low, high = high, ((2.0 * m + 3.0 + gamma * reach) * high - (m + 1.0) * low) / (m + 2.0)
@@ -349,6 +349,9 @@ def _follow(st, plan, factors, t, b, d, g, integrated):
         else:
             for i in range(n):
                 own[i] = before[i] - delta[i]
+        if m >= st.order and weighted_max(own, w_error) > CONVERGES * size:
+            terms = m
+            break
     _add_answer(st, t, gamma, d, g, terms, integrated)
     return moves
 

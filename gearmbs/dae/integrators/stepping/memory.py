@@ -112,6 +112,7 @@ class Laid(Continued, Protocol):
     itself: ref
     row: int
     crossings: list[tuple[float, int]]
+    told: dict[int, float]
     last_records: Any
 
     def pack(self, row: int, block: np.ndarray) -> int:
@@ -172,6 +173,7 @@ class Held(Mapping[str, np.ndarray]):
         self._part_arrays = [getattr(part, name).copy() for name in PART_ARRAYS] if part.count else ()
         self._counts, self._counted = (run.repivots, run.first_pivots), run.counted.tobytes()
         self.given, self.table, self.crossings = given, run.last_records.table, tuple(run.crossings)
+        self.told = dict(run.told)
 
     def belongs_to(self, run: Continued) -> bool:
         """Whether it is of this very run."""
