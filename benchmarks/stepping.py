@@ -1,8 +1,9 @@
 """What it costs to step a simulation: points 0.1 ms apart against one run with them as outputs, inputs set at each of
 them, and states in and out; and what integrators do for it.
 
-``OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python -m benchmarks.stepping``: smallest processor times of interleaved
-repetitions, one after another in an order that changes: a run finds caches as the one before has left them.
+``OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 python -m benchmarks.stepping``: medians of processor times over
+interleaved repetitions, and of their ratios to one run's in the same repetition; their order changes, for a run finds
+caches as the one before has left them.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from gearmbs.studies.run.simulation import case_mechanism
 
 RATE = 1e4
 """Communication points a second."""
-REPEATS = 15
+REPEATS = 21
 STATES = 200
 SWING = 20.0
 """Of the inputs, Hz."""
@@ -50,7 +51,7 @@ def _stepped(m: Mechanism, times: np.ndarray, records: bool, options: dict[str, 
         sim.advance(t)
 
 
-def stepping_costs(m: Mechanism, span: float, **options: Any) -> dict[str, float]:
+def stepping_costs(m: Mechanism, span: float, **options: Any) -> dict[str, np.ndarray]:
     """Return processor seconds of one run with outputs, of one without, and of steps with and without records."""
     times = np.linspace(0.0, span, round(span * RATE) + 1)
     kinds: dict[str, Callable[[], Any]] = {
@@ -59,12 +60,12 @@ def stepping_costs(m: Mechanism, span: float, **options: Any) -> dict[str, float
         "stepped": partial(_stepped, m, times, True, options),
         "no records": partial(_stepped, m, times, False, options),
     }
-    return _least(kinds)
+    return _taken(kinds)
 
 
 def input_costs(
     m: Mechanism, body: str, torque: float, span: float, **options: Any
-) -> tuple[dict[str, float], dict[str, SolverStats]]:
+) -> tuple[dict[str, np.ndarray], dict[str, SolverStats]]:
     """Return processor seconds of one run, and of steps with a further torque set at each, held or led.
 
     It swings at 20 Hz by half of ``torque`` (N m), by a hundredth, and by so little that nothing is to be resolved.
@@ -86,19 +87,25 @@ def input_costs(
 
     stats["one run"] = m.simulate(span, t_eval=times, **options).stats
     kinds: dict[str, Callable[[], Any]] = {"one run": partial(m.simulate, span, t_eval=times, **options)}
-    return _least(kinds | {kind: partial(steered, kind) for kind in KINDS}), stats
+    return _taken(kinds | {kind: partial(steered, kind) for kind in KINDS}), stats
 
 
-def _least(kinds: dict[str, Callable[[], Any]]) -> dict[str, float]:
-    """Return the smallest processor times of interleaved repetitions, s."""
-    best, order = dict.fromkeys(kinds, np.inf), np.random.default_rng(0)
-    for _ in range(REPEATS):
+def _taken(kinds: dict[str, Callable[[], Any]]) -> dict[str, np.ndarray]:
+    """Return the processor times of interleaved repetitions, s, after one that finds kernels and layouts."""
+    taken, order = {name: np.empty(REPEATS) for name in kinds}, np.random.default_rng(0)
+    for run in kinds.values():
+        run()
+    for j in range(REPEATS):
         for k in order.permutation(len(kinds)):
             name = list(kinds)[k]
             begin = time.process_time()
             kinds[name]()
-            best[name] = min(best[name], time.process_time() - begin)
-    return best
+            taken[name][j] = time.process_time() - begin
+    return taken
+
+
+def _ratio(cost: np.ndarray, one: np.ndarray) -> str:
+    return number(float(np.median(cost / one)), 3)
 
 
 def state_costs(m: Mechanism, at: float, **options: Any) -> dict[str, float]:
@@ -128,8 +135,8 @@ def main() -> None:
     rows = []
     for name, (m, _, _, span, options) in models.items():
         costs, states = stepping_costs(m, span, **options), state_costs(m, 0.2 * span, **options)
-        one = costs["one run"]
-        ratios = [number(costs[kind] / one, 3) for kind in ("no outputs", "stepped", "no records")]
+        ratios = [_ratio(costs[kind], costs["one run"]) for kind in ("no outputs", "stepped", "no records")]
+        one = float(np.median(costs["one run"]))
         between = one / (span * RATE)
         taken = [number(took / between, 2) for took in states.values()]
         rows.append([name, number(1e3 * one, 3), *ratios, *(number(1e6 * took, 3) for took in states.values()), *taken])
@@ -140,7 +147,7 @@ def main() -> None:
     for name, (m, body, torque, span, options) in models.items():
         costs, stats = input_costs(m, body, torque, span, **options)
         one = costs.pop("one run")
-        rows.append([name, number(1e3 * one, 3), *(number(cost / one, 3) for cost in costs.values())])
+        rows.append([name, number(1e3 * float(np.median(one)), 3), *(_ratio(cost, one) for cost in costs.values())])
         counted += [[name, kind, *(str(getattr(done, count)) for count in COUNTS)] for kind, done in stats.items()]
     print(table(heads, rows))
     print(table(["model", "run", *COUNTS], counted))

@@ -296,7 +296,7 @@ def _driver(begun: Begun, numbers: Mapping[str, Number], deforms: bool) -> Drive
         table=records.table.copy(),
         table_before=records.before.copy(),
         cells=cells.astype(np.int64),
-        held=np.array(point.held, dtype=float),
+        held=point.rows.kept[point.row, run.turns :].copy(),
         values=np.zeros(cells.size),
         is_input=np.array([number.kind == INPUT for number in own], dtype=np.int64),
         loads=np.array([number.loads for number in own], dtype=np.int64),

@@ -113,7 +113,6 @@ class Sampled:
     number: Callable[[str], Number]
     set: Callable[..., None]
     _controls: list[Control]
-    _plain: bool
     _unmet: list[str]
     _origin: State | None
 
@@ -176,7 +175,7 @@ class Sampled:
             made.go_back(self.t, self._origin.controllers[name])
         self._unmet = [other for other in self._unmet if other != name]
         self._controls.append(made)
-        self._plain = False
+        self.__dict__["_ready"] = None
 
     def _sample(self, t: float) -> float:
         """Call the controllers whose sample time has come; return the next one of any, or ``t`` if that is earlier."""

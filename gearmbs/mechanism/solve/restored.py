@@ -19,7 +19,7 @@ from gearmbs.mechanism.language.user_functions import raised_errors
 from gearmbs.mechanism.solve.controllers import Control
 from gearmbs.mechanism.solve.told import Point, Told
 
-new_point = new_mark = tuple.__new__
+new_mark = tuple.__new__
 """Makes one of its parts in half the time that its class takes."""
 
 
@@ -30,10 +30,8 @@ class Mark(NamedTuple):
     ----------
     points : int
         Points so far.
-    point : Point
-        The present one.
-    held : ndarray
-        What named numbers are.
+    point : tuple
+        The present one, see `gearmbs.mechanism.solve.told.Point`.
     led : tuple of str
         Inputs whose lines end there.
     given : ndarray
@@ -41,8 +39,7 @@ class Mark(NamedTuple):
     """
 
     points: int
-    point: Point
-    held: np.ndarray
+    point: tuple
     led: tuple[str, ...]
     given: np.ndarray
 
@@ -65,34 +62,34 @@ class Restored(Told):
     _stand_at: Callable[[Point, bool], None]
     _tell_clock: Callable[[], None]
     _check_outside: Callable[[str], None]
-    _is_plain: Callable[[], bool]
+    _when_ready: Callable[[], Any]
 
     def state(self) -> State:
         """Return the present state with the integrator's history: what follows from it is the same, bit for bit."""
         own = self.__dict__
         if own["_failed"] is not None:
             raise ModelError(f"the simulation has failed: {self._failed} Go back with restore(state)")
-        settings, point, run = own["_settings"], own["_point"], own["_run"]
+        settings, point, run = own["_settings"], own["_at"], own["_run"]
         if settings.waiting or settings.led:
             self.take_effect()
-            point, run = own["_point"], own["_run"]
+            point, run = own["_at"], own["_run"]
         if not own["_equations"]:
             own["_equations"] = equations_of(self._base)
         if run.started and run.state.steps:
             state = self._with_history(run, point)
         else:
-            state = self._at_start(run, point)
+            state = self._at_start(run, Point(*point))
         if own["_controls"]:
             held = {control.name: control.memory() for control in self._controls if control.remembers}
             return replace(state, controllers=held) if held else state
         return state
 
-    def _with_history(self, run: HeldRun, point: Point) -> State:
+    def _with_history(self, run: HeldRun, point: tuple) -> State:
         """Return the state at a point of a run that is under way."""
         own, history = self.__dict__, run.history(self._equations, point)
         held: Any = history.numbers
         settings, given = own["_settings"], self._places_given()
-        held.mark = new_mark(Mark, (len(own["_points"]), point, settings.held, tuple(settings.led), given))
+        held.mark = new_mark(Mark, (len(own["_points"]), point, tuple(settings.led), given))
         integers, before = self._changed_integers(point[3]), own["_base"].rdata
         return State.held(self._of_model, point[0], held, history, integers, before, given)
 
@@ -180,7 +177,7 @@ class Restored(Told):
                 control.go_back(self.t, state.controllers.get(control.name))
         elif self._unmet:
             self._unmet = []
-        self.__dict__["_plain"] = self._is_plain()
+        self.__dict__["_ready"] = self._when_ready()
         if self._jumped:
             self._jumped = [t for t in self._jumped if t <= self.t]
 
@@ -211,7 +208,7 @@ class Restored(Told):
         y = state.y.tobytes()
         told = self._before.get(y, y)
         while at < len(self._points) and self._points[at][0] == state.t:
-            if self._points[at].y.tobytes() == told:
+            if Point(*self._points[at]).y.tobytes() == told:
                 return at
             at += 1
         return None
@@ -239,14 +236,14 @@ class Restored(Told):
             del points[first + 1 :]
         self._tell_clock()
         settings, t = own["_settings"], mark[1][0]
-        settings.go_back(mark[2], mark[3], t)
-        own["_given"] = mark[4]
+        settings.go_back(mark[2], t)
+        own["_given"] = mark[3]
         own["_failed"] = own["_passed"] = own["_present"] = None
         if own["_counted"]:
             own["_counted"] = {}
         own["_next_look"] = t if own["_system"].has_dropped_rows else np.inf
         own["_since"] = own["t"] = t
-        own["_point"] = new_point(Point, (t, place[0], place[1], run.table, settings.held))
+        own["_at"] = t, place[0], place[1], run.table
         return True
 
     def __copy__(self) -> Any:

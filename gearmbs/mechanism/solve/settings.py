@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.dae.integrators.stepping.jumps import CHANGED, LED, ON_LINE
+from gearmbs.dae.integrators.stepping.jumps import LED, ON_LINE
 from gearmbs.dae.problem import INPUT, ModelError, Number, cells_of
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.wording import did_you_mean
@@ -46,7 +46,7 @@ class Settings:
     cells : ndarray of int
         All places in the table of numbers.
     held : ndarray
-        What stands there from the last change on.
+        What stands there from the last change on, a copy.
     led : dict of str to float
         Inputs on a line, and when it ends.
     waiting : dict of str to (float, int)
@@ -82,29 +82,34 @@ class Settings:
         self.waiting: dict[str, tuple[float, int]] = {}
         self.given: set[str] = set()
         self.led: dict[str, float] = {}
-        self.held = np.empty(self.cells.size)
+        self._numbers = np.empty(0)
+        """The table of the run."""
+
+    @property
+    def held(self) -> np.ndarray:
+        return self._numbers[self.cells]
 
     def begin(self, rdata: np.ndarray, t: float) -> None:
-        """Take what stands in a table; lines end at its time, ``t``."""
+        """Take what stands in the table of a run, now and later; lines end at its time, ``t``."""
         self.waiting.clear()
-        if not self.cells.size:
-            return
-        self.held = rdata[self.cells]
-        self.led = {name: t for name in self._inputs if self._own[name].line(self.held, t)[1] != 0.0}
+        self._numbers = rdata
+        if self.cells.size:
+            held = self.held
+            self.led = {name: t for name in self._inputs if self._own[name].line(held, t)[1] != 0.0}
 
-    def go_back(self, held: np.ndarray, led: tuple[str, ...], t: float) -> None:
-        """Let that be held which was at an earlier time, at which the lines of some inputs end."""
+    def go_back(self, led: tuple[str, ...], t: float) -> None:
+        """Go back to an earlier time, at which the lines of some inputs end; the run has done so."""
         self.waiting.clear()
         self.given.clear()
-        self.held, self.led = held, dict.fromkeys(led, t)
+        self.led = dict.fromkeys(led, t)
 
     def snapshot(self) -> tuple[Any, ...]:
         """Return what is set and what waits, for `put_back`."""
-        return self.held, dict(self.waiting), dict(self.led), set(self.given)
+        return self._numbers, dict(self.waiting), dict(self.led), set(self.given)
 
     def put_back(self, snapshot: tuple[Any, ...]) -> None:
         """Let it be as it was."""
-        self.held, waiting, self.led, given = snapshot
+        self._numbers, waiting, self.led, given = snapshot
         self.waiting.update(waiting)
         self.given.update(given)
 
@@ -174,11 +179,9 @@ class Settings:
             return None
         return name, value, hold, *places
 
-    def take_steered(self, name: str, code: int, held: np.ndarray, end: float) -> None:
-        """Note that it has been steered, with what `jumps.steer` has returned and left."""
+    def take_steered(self, name: str, code: int, end: float) -> None:
+        """Note that it has been steered, by what `jumps.steer` has returned."""
         self.waiting.clear()
-        if code & CHANGED:
-            self.held = held
         if code & LED:
             self.led[name] = end
         elif self.led:
@@ -186,7 +189,7 @@ class Settings:
 
     def take(self, t: float, end: float) -> Change | None:
         """Return what changes at ``t``, None for nothing; lines that begin there end at ``end``."""
-        waiting, before, after = self.waiting, self.held, self.held.copy()
+        waiting, before, after = self.waiting, self.held, self.held
         loads, jumps, leads, prescribes, unsure, bent = True, False, False, False, False, False
         ended = [name for name, last in self.led.items() if last <= t and name not in waiting] if self.led else ()
         for name in (*waiting, *ended):
@@ -210,5 +213,4 @@ class Settings:
         waiting.clear()
         if not (jumps or leads):
             return None
-        self.held = after
-        return Change(self.held, loads, jumps, leads, prescribes, unsure, bent or not loads)
+        return Change(after, loads, jumps, leads, prescribes, unsure, bent or not loads)

@@ -16,6 +16,7 @@ from gearmbs._lazy import Guessed, uncollected
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
+from gearmbs.dae.integrators.stepping.jumps import LED
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.model.system import settle_states
 from gearmbs.dae.problem import DAEProblem, ModelError, Number
@@ -51,8 +52,6 @@ if TYPE_CHECKING:
 
 NOTHING = nullcontext()
 """Null context, used when the mechanism has no functions of Python."""
-new_point = tuple.__new__
-"""Makes a point of its parts in half the time that its class takes."""
 OWN = {
     "Simulator": ("t_start", "integrator", "formulation", "tol", "rate_scale", "lump", "initial", "records", "stops"),
 }
@@ -177,8 +176,6 @@ class Simulator(Sampled, Restored, Guessed):
         self._functions = list(mechanism.functions.values())
         self._mechanism = mechanism
         self._controls: list[Control] = []
-        self._plain = False
-        """Whether nothing of Python has to be asked on the way."""
         self._inside = ""
         """Whose controller has been called and has not returned, or that a function in the equations has."""
         self._unmet: list[str] = []
@@ -239,25 +236,26 @@ class Simulator(Sampled, Restored, Guessed):
         held = (cells, np.empty((0, cells.size)))
         empty = DAEResult(np.empty(0), nothing, nothing, Status.SUCCESS, "", held=held)
         # lines end where a state is
-        self._settings.begin(problem.rdata, float(problem.t0))
+        self._settings.begin(self._run.state.rdata, float(problem.t0))
         self._row = Solution(self._system, problem, empty, self._members)
         self._row.inside = just_inside(np.array([problem.t0, self.t_end]))
         self._row.share(1)
         self._next_look = problem.t0 if self._system.has_dropped_rows else np.inf
-        self._points: list[Point] = []
-        self._counted: dict[Any, tuple[Point, Any]] = {}
+        self._points: list[tuple] = []
+        self.__dict__["_ready"] = None
+        self._counted: dict[Any, tuple[tuple, Any]] = {}
         """Points at which angles have last been counted, and what they were."""
         self._failed: str | None = None
         self._passed: StopAt | None = None
         """The one of ``stops`` that a jump at the present time has passed, not told yet."""
         place = self._run.place(problem.y0, problem.yp0)
-        self._stand_at(Point(float(problem.t0), *place, problem.idata, self._settings.held), self._records)
+        self._stand_at(Point(float(problem.t0), *place, problem.idata), self._records)
         self._since = self.t
 
     def _stand_at(self, point: Point, record: bool) -> None:
         # past the look at names that are assigned, which takes as long as all the rest
         own = self.__dict__
-        own["t"], own["_point"], own["_present"] = point[0], point, None
+        own["t"], own["_at"], own["_present"] = point[0], point, None
         if record:
             own["_points"].append(point)
 
@@ -278,21 +276,26 @@ class Simulator(Sampled, Restored, Guessed):
             simulator then stands where it stood, and can only be restored to an earlier state.
         """
         own = self.__dict__
-        if own["_plain"] and type(t) is float and own["t"] < t <= own["t_end"] and own["_failed"] is None:
+        ready = own["_ready"]
+        if ready is not None and type(t) is float and own["t"] < t <= own["t_end"] and own["_failed"] is None:
             # as below, by one call of compiled code
-            settings, run, keep = own["_settings"], own["_run"], record and own["_records"]
-            rows, row, began = run.rows, run.row, perf_counter()
+            run, settings, go_next, at, known = ready
+            keep, began = record and own["_records"], perf_counter()
+            rows, table = run.rows, known.table
             if settings.waiting or settings.led:
-                if t - own["t"] < RESOLVED * own["t_end"] or (done := self._steer_to(t, keep)) is None:
+                if t - own["t"] < RESOLVED * own["t_end"] or (row := self._steer_to(t, keep)) is None:
                     return self._advance(t, record)
-                (failure,) = done
             else:
-                failure = run.go_to(t, keep)
+                row = go_next(at, t, keep)
+            if row < 0:
+                code, row = -1 - row, run.row
+                failure = run.arrive(code, t, keep)
+                table = run.table
+                if failure is not None:
+                    self._fail(failure)
             own["_took"] += perf_counter() - began
-            if failure is not None:
-                self._fail(failure)
             own["t"], own["_present"] = t, None
-            own["_point"] = point = new_point(Point, (t, rows, row, run.table, settings.held))
+            own["_at"] = point = t, rows, row, table
             if keep:
                 own["_points"].append(point)
             if t >= own["_next_look"]:
@@ -327,17 +330,23 @@ class Simulator(Sampled, Restored, Guessed):
                 self._run.tell(hit)
                 return self._stops[hit[1]]
             self._go_to(end, record and end == t)
-        own["_plain"] = self._is_plain()
+        own["_ready"] = self._when_ready()
         return None
 
-    def _is_plain(self) -> bool:
-        return not (self._controls or self._stops or self._functions or self._unmet)
+    def _when_ready(self) -> tuple[HeldRun, Settings, Any, int, Any] | None:
+        """Return what :meth:`advance` takes where nothing of Python has to be asked on the way, else None."""
+        run = self._run
+        if not run.quick or self._controls or self._stops or self._functions or self._unmet:
+            return None
+        return run, self._settings, run.go_next, run.at, run.last_records
 
     def _stay(self, record: bool) -> None:
         """Let the present time be a point of the solution if it is to be one and is none."""
         point = self._point
-        if record and self._records and not (self._points and self._points[-1].t == point.t):
-            self._stand_at(Point(point.t, *self._run.place(point.y, point.yp), point.idata, point.held), True)
+        if record and self._records and not (self._points and self._points[-1][0] == point.t):
+            rows, row = self._run.place(point.y, point.yp)
+            rows.kept[row] = point.rows.kept[point.row]
+            self._stand_at(Point(point.t, rows, row, point.idata), True)
 
     def _crossing(self, end: float) -> tuple[float, int] | None:
         """Return time and number of the next stop up to a time that steps have come to, going on as far as needed."""
@@ -371,7 +380,7 @@ class Simulator(Sampled, Restored, Guessed):
         rows, row = run.rows, run.row
         self._run_to(t, keep)
         own["t"], own["_present"] = t, None
-        own["_point"] = point = new_point(Point, (t, rows, row, run.table, own["_settings"].held))
+        own["_at"] = point = t, rows, row, run.table
         if keep:
             own["_points"].append(point)
         if t >= self._next_look:
@@ -439,23 +448,6 @@ class Simulator(Sampled, Restored, Guessed):
         if self._failed is not None:
             raise ModelError(f"the simulation has failed: {self._failed}")
         return Begun(self._run, self._point, self._system, self._base, self._settings.cells)
-
-    @property
-    def failed(self) -> bool:
-        """Whether the integration has failed."""
-        return self._failed is not None
-
-    @property
-    def real_time_factor(self) -> float:
-        """Seconds simulated in a second of the clock, in all calls of :meth:`advance`; 0 before the first."""
-        self._tell_clock()
-        return self._simulated / self._took if self._took > 0.0 else 0.0
-
-    def _tell_clock(self) -> None:
-        """Count the time simulated since it was last told, or the run began."""
-        own = self.__dict__
-        own["_simulated"] += self.t - self._since
-        own["_since"] = own["t"]
 
     # --- acting on it ---------------------------------------------------------------------------------
 
@@ -525,7 +517,7 @@ class Simulator(Sampled, Restored, Guessed):
         if change is None:
             return
         # where the simulation starts nothing has been before
-        before = run.event_values(own["_point"]) if own["_stops"] and own["t"] > own["_t_start"] else None
+        before = run.event_values(own["_at"]) if own["_stops"] and own["t"] > own["_t_start"] else None
         if change.prescribes or change.unsure or not run.state.steps:
             self._start_with(change.values)
             if change.prescribes:
@@ -533,7 +525,7 @@ class Simulator(Sampled, Restored, Guessed):
         else:
             began = perf_counter()
             with raised_errors(self._functions) if self._functions else NOTHING:
-                run.change(own["_point"], settings.cells, change)
+                run.change(own["_at"], settings.cells, change)
             own["_took"] += perf_counter() - began
         if before is not None:
             self._note_passed(before)
@@ -551,30 +543,34 @@ class Simulator(Sampled, Restored, Guessed):
     def _steer(self, end: float) -> bool:
         """Let what has been set take effect in one compiled call, where it is one input of loads; return that."""
         own = self.__dict__
-        settings, point, began = own["_settings"], own["_point"], perf_counter()
+        settings, point, began = own["_settings"], own["_at"], perf_counter()
         if (one := settings.steered()) is None:
             return False
         name, value, hold, first, count = one
-        done = own["_run"].steer(point, first, count, value, end if hold else point[0], settings.held.size)
-        if done is None:
+        code = own["_run"].steer(point, first, count, value, end if hold else point[0])
+        if code is None:
             return False
-        settings.take_steered(name, *done, end)
+        settings.take_steered(name, code, end)
         own["_took"] += perf_counter() - began
         return True
 
-    def _steer_to(self, t: float, keep: bool) -> tuple[tuple[Status, str] | None] | None:
-        """Do the same and go on to ``t`` in that call; return what `HeldRun.go_to` does, None where it cannot be."""
+    def _steer_to(self, t: float, keep: bool) -> int | None:
+        """Do the same and go on to ``t`` in that call; return what `standing.go_next` does, None where it cannot be."""
         own = self.__dict__
-        settings, point = own["_settings"], own["_point"]
+        settings, point = own["_settings"], own["_at"]
         if (one := settings.steered()) is None:
             return None
         name, value, hold, first, count = one
-        done = own["_run"].steer_to(point, first, count, value, t if hold else point[0], settings.held.size, t, keep)
+        done = own["_run"].steer_to(point, first, count, value, hold, t, keep)
         if done is None:
             return None
-        code, held, failure = done
-        settings.take_steered(name, code, held, t)
-        return (failure,)
+        code, row = done
+        settings.waiting.clear()
+        if code & LED:
+            settings.led[name] = t
+        elif settings.led:
+            settings.led.clear()
+        return row
 
     def _start_with(self, values: np.ndarray) -> None:
         """Start afresh at the present time with other numbers; velocities that they prescribe jump there."""
@@ -594,7 +590,7 @@ class Simulator(Sampled, Restored, Guessed):
         if begun:
             self._problem, self._origin = first
             self._points = points
-            self._point = point
+            self.__dict__["_at"] = point
             self._run.told = told
 
     def __repr__(self) -> str:

@@ -36,13 +36,12 @@ COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
 
 
 class Point(NamedTuple):
-    """Where a simulation has stood: time, the row of what rows, the table of integers, and what named numbers were."""
+    """Where a simulation has stood: time, the row of what rows, and the table of integers."""
 
     t: float
     rows: Rows
     row: int
     idata: np.ndarray
-    held: np.ndarray
 
     @property
     def y(self) -> np.ndarray:
@@ -83,15 +82,24 @@ class Told(OwnAttributes):
     _run: HeldRun
     _settings: Settings
     _row: Solution
-    _point: Point
+    _at: tuple
+    """The parts of the present point, of which `Point` would take as long as all the rest between two of them."""
     _present: Solution | None
-    _points: list[Point]
-    _counted: dict[Any, tuple[Point, Any]]
+    _points: list[tuple]
+    _counted: dict[Any, tuple[tuple, Any]]
     _jumped: list[float]
     _records: bool
     _failed: str | None
+    _simulated: float
+    _took: float
+    _since: float
     _origin: State | None
     _given: np.ndarray
+
+    @property
+    def _point(self) -> Point:
+        """Where the simulation stands."""
+        return Point(*self._at)
 
     @overload
     def get(self, what: Number, *names: Any) -> float: ...
@@ -171,7 +179,7 @@ class Told(OwnAttributes):
         if self._present is None:
             point = self._point
             self._present = self._row.over(
-                np.array([point.t]), point.y[None, :], [(0, point.idata)], point.held[None, :]
+                np.array([point.t]), point.y[None, :], [(0, point.idata)], self._held(point)[None, :]
             )
             # turns as the run counts them at every step
             evaluator: Any = self._row._shared
@@ -197,19 +205,40 @@ class Told(OwnAttributes):
         self._counted["evaluate", text] = path[-1], ends
         return float(values[-1])
 
-    def _path(self, after: Point | None) -> list[Point]:
+    def _held(self, point: Point) -> np.ndarray:
+        """Return what named numbers were up to a point."""
+        return point.rows.kept[point.row, self._run.turns :]
+
+    def _path(self, after: tuple | None) -> list[tuple]:
         """Return the points kept behind an earlier one, and the present one, which need not be among them.
 
         Sample times of controllers are none, nor are points that are not to be recorded: their values are copied, since
         the next one is written over them.
         """
         points, point = self._points, self._point
-        path = points[:] if after is None else [after, *points[bisect_right(points, after.t, key=itemgetter(0)) :]]
-        if not path or path[-1].t != point.t:
+        path = points[:] if after is None else [after, *points[bisect_right(points, after[0], key=itemgetter(0)) :]]
+        if not path or path[-1][0] != point.t:
             rows, row = point.rows, point.row
             own = Rows(*(column[row : row + 1].copy() for column in rows))
-            path.append(Point(point.t, own, 0, point.idata, point.held))
+            path.append((point.t, own, 0, point.idata))
         return path
+
+    @property
+    def failed(self) -> bool:
+        """Whether the integration has failed."""
+        return self._failed is not None
+
+    @property
+    def real_time_factor(self) -> float:
+        """Seconds simulated in a second of the clock, in all calls of :meth:`advance`; 0 before the first."""
+        self._tell_clock()
+        return self._simulated / self._took if self._took > 0.0 else 0.0
+
+    def _tell_clock(self) -> None:
+        """Count the time simulated since it was last told, or the run began."""
+        own = self.__dict__
+        own["_simulated"] += self.t - self._since
+        own["_since"] = own["t"]
 
     def solution(self, first: int = 0) -> Solution:
         """Return the motion and forces over all points so far, from the start on or from the one with a number.
@@ -235,12 +264,13 @@ class Told(OwnAttributes):
         if not self._records:
             raise ModelError(f"{what}: it needs the points so far; make the simulator with records=True")
 
-    def _over(self, points: list[Point]) -> Solution:
+    def _over(self, points: list[tuple]) -> Solution:
         """Return the solution over some points."""
-        t, rows, places, tables, held = zip(*points, strict=True)
-        y, yp, counted = (
+        t, rows, places, tables = zip(*points, strict=True)
+        y, yp, kept = (
             np.array([getattr(r, name)[k] for r, k in zip(rows, places, strict=True)]) for name in ("y", "yp", "kept")
         )
+        turns = self._run.turns
         epochs: list[tuple[int, np.ndarray]] = []
         for row, table in enumerate(tables):
             if not epochs or not (table is epochs[-1][1] or np.array_equal(table, epochs[-1][1])):
@@ -249,8 +279,8 @@ class Told(OwnAttributes):
         told = Status.SUCCESS if self._failed is None else Status.SOLVER_FAILURE
         result = DAEResult(
             np.array(t), y, yp, told, self._failed or f"Advanced to t = {self.t:.9g} s.", stats,
-            epochs=epochs, t_last=self.t, held=(cells, np.array(held)) if cells.size else None,
-            counted=counted,
+            epochs=epochs, t_last=self.t, held=(cells, kept[:, turns:]) if cells.size else None,
+            counted=kept[:, :turns],
         )  # fmt: skip
         solution = Solution(self._system, self._problem, result, self._members, self._remark)
         solution.initial, solution.given = self._origin, self._places_given()

@@ -32,7 +32,17 @@ from gearmbs.dae.integrators.stepping.memory import (
     words_of,
 )
 from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, address_of_advance, drain, stand_behind
-from gearmbs.dae.integrators.stepping.standing import Standing, go_on, pack, steer_and_go_on, steer_on, unpack
+from gearmbs.dae.integrators.stepping.standing import (
+    AHEAD,
+    Standing,
+    go_next,
+    go_on,
+    pack,
+    place_of_functions,
+    steer_next,
+    steer_on,
+    unpack,
+)
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import Status
 from gearmbs.dae.state import History
@@ -99,7 +109,11 @@ class Rows(NamedTuple):
     y: np.ndarray
     yp: np.ndarray
     kept: np.ndarray
-    """Counted turns."""
+    """Counted turns, and behind them what named numbers were."""
+
+
+Numbers = tuple[np.ndarray, bool, bool, bool, bool, bool, bool]
+"""What `HeldRun.change` takes."""
 
 
 class HeldRun(Run):
@@ -126,7 +140,6 @@ class HeldRun(Run):
     def __init__(self, problem: DAEProblem, t_end: float, options: Options) -> None:
         super().__init__(problem, None, t_end, replace(options, history=None))
         self.options = options
-        self._look_at = 0
         self.last_records = LastRecords(self.state)
         self.records = self.last_records  # type: ignore[assignment]
         self.table = self.last_records.table
@@ -134,8 +147,8 @@ class HeldRun(Run):
         self._jumped: tuple[int, float, Rows, int] | None = None
         """Steps, time and point behind which numbers of the equations have changed."""
         self._scratch = np.empty((TERMS + 3, problem.n))
-        self._pass_jump, self._go_on, self._steer_on = direct(pass_jump), direct(go_on), direct(steer_on)
-        self._steer_and_go_on = direct(steer_and_go_on)
+        self._pass_jump, self._go_on, self.go_next = direct(pass_jump), direct(go_on), direct(go_next)
+        self._steer_on, self._steer_next = direct(steer_on), direct(steer_next)
         self._pack, self._unpack = direct(pack), direct(unpack)
         self.itself = ref(self)
         self.crossings: list[tuple[float, int]] = []
@@ -143,18 +156,22 @@ class HeldRun(Run):
         self.told = dict.fromkeys(range(self.state.n_events), float(problem.t0))
         """Times at which crossings of each event have last been told; what passes at the start has done so before."""
         self._errors = options.errors
-        self._watched = self._quick = False
+        self._watched = self.quick = False
         """Whether ``stall`` may have noted something; whether nothing but steps may come on the way to a time."""
-        self._make_rows()
         self.layout, numbers = laid_out(self)
         nothing = np.zeros(0, dtype=np.int64)
         st, part = self.state, self.algebraic.part
         self._standing = Standing(
-            state=ctypes.addressof(st), part=ctypes.addressof(part), advance=address_of_advance(), scalars=words_of(st),
-            part_scalars=words_of(part), numbers=numbers, factor_numbers=np.zeros(0), cells=nothing, places=nothing,
+            state=ctypes.addressof(st), part=ctypes.addressof(part), advance=address_of_advance(),
+            functions=direct(place_of_functions)(self.functions), scalars=words_of(st), part_scalars=words_of(part),
+            numbers=numbers, factor_numbers=np.zeros(0), cells=nothing, places=nothing, values=np.zeros(0),
             scratch=self._scratch,
         )  # fmt: skip
-        self._at = ctypes.addressof(self._standing)
+        self.turns = len(st.kept)
+        """How many numbers of a point in ``rows.kept`` count turns."""
+        self.at = ctypes.addressof(self._standing)
+        """For `go_next`."""
+        self._make_rows()
         self._placed: Any = None
         """The factors whose place is known."""
         self.words = self.layout.factors
@@ -164,13 +181,15 @@ class HeldRun(Run):
 
     def take_inputs(self, cells: np.ndarray, places: Sequence[np.ndarray]) -> None:
         """Take the cells of named numbers, and of each input that can be steered its places among them."""
-        self._standing.cells = cells
+        self._standing.cells, self._standing.values = cells, np.empty(cells.size)
+        self.state.kept = np.concatenate([self.state.kept[: self.turns], cells])
+        self._make_rows()
         self._standing.places = np.concatenate([np.ravel(own) for own in places]) if places else cells[:0]
 
     def _find_factors(self) -> None:
         """Find the place of the factors, which pivots that are chosen anew change."""
         plan, factors = self.plan, self.factors
-        self._quick = self.started and not self.state.n_events and self._errors is None
+        self.quick = self.started and not self.state.n_events and self._errors is None
         if factors is not self._placed and factors is not None and plan is not None:
             standing, self._placed = self._standing, factors
             standing.plan, standing.factors = ctypes.addressof(plan), ctypes.addressof(factors)
@@ -187,18 +206,25 @@ class HeldRun(Run):
         rows = Rows(np.full(count, np.inf), np.empty((count, n)), np.empty((count, n)), np.empty((count, len(st.kept))))
         st.outputs, st.y_out, st.yp_out, st.kept_out = rows
         st.next_output = count
-        self.rows, self.row, self._first, self._count = rows, 0, 0, count
+        standing, self.rows = self._standing, rows
+        standing.row, standing.first, standing.count = 0, 0, count
+
+    @property
+    def row(self) -> int:
+        """The row of the next point."""
+        return self._standing.row
 
     def _stand(self, keep: bool) -> None:
         """Let the point in ``row`` be the present one; the one before it is written over unless it is to be kept."""
-        row, times = self.row, self.rows.t
-        times[row] = np.inf
+        standing = self._standing
+        row, first = standing.row, standing.first
+        self.rows.t[row] = np.inf
         if keep:
-            self._first = self.row = row + 1
-            if row + 2 >= self._count:
+            standing.first = standing.row = row + 1
+            if row + 2 >= standing.count:
                 self._make_rows()
         else:
-            self.row = self._first + 1 if row == self._first else self._first
+            standing.row = first + 1 if row == first else first
 
     def place(self, y: np.ndarray, yp: np.ndarray, keep: bool = True) -> tuple[Rows, int]:
         """Keep values at the time where the run stands; return rows and row."""
@@ -227,26 +253,22 @@ class HeldRun(Run):
         Some steps are taken at once, whatever else there is to do, for which Python takes as long as they do. Ctrl-C
         comes in between then, after them: ``st.code`` knows what is left to do.
         """
-        row, code = self.row, NOT_BEGUN
-        if self._quick:
-            code = self._go_on(self.functions, self._at, t, row, self._look_at)
-            if code == REACHED and row + 2 < self._count:
-                # as `_arrive` does, at most points
+        code = NOT_BEGUN
+        if self.quick:
+            row = self.go_next(self.at, t, keep)
+            if row >= 0:
                 self.table = self.last_records.table
-                if keep:
-                    self._first = self.row = row + 1
-                else:
-                    self.row = self._first + 1 if row == self._first else self._first
                 return None
+            code = -1 - row
         elif self.started:
             if self.crossings and t > self.state.t:
                 self.crossings.clear()
-            code = self._go_on(self.functions, self._at, t, row, self._look_at)
-        return self._arrive(code, t, row, keep)
+            code = self._go_on(self.at, t)
+        return self.arrive(code, t, keep)
 
-    def _arrive(self, code: int, t: float, row: int, keep: bool) -> tuple[Status, str] | None:
+    def arrive(self, code: int, t: float, keep: bool) -> tuple[Status, str] | None:
         """Do what is left to do after a compiled call on the way to a time, by what it has returned; see `go_to`."""
-        st = self.state
+        st, row = self.state, self.row
         if code == REACHED and not self._errors:
             self.table = self.last_records.table
             self._stand(keep)
@@ -269,7 +291,7 @@ class HeldRun(Run):
         self._find_factors()
         self._watched = True
         # before the first step there are no factors
-        self._look_at = 0 if self.stall.looking else st.steps + LOOK
+        self._standing.look_at = 0 if self.stall.looking else st.steps + LOOK
         if told[0] < 0:
             return told
         if st.n_crossings:
@@ -362,7 +384,7 @@ class HeldRun(Run):
         rows.y[row], rows.yp[row] = value_in(self, self.last_step(), t)
         rows.kept[row] = self.state.rdata[self.state.kept]
 
-    def change(self, point: tuple, cells: np.ndarray, change: tuple[np.ndarray, bool, bool, bool, bool, bool, bool]) -> None:
+    def change(self, point: tuple, cells: np.ndarray, change: Numbers) -> None:
         """Cut the last step back to a time within it, and go on from there with other numbers in the equations.
 
         Parameters
@@ -421,42 +443,41 @@ class HeldRun(Run):
             # what has just passed does so once
             st.g_old[fired] = 0.0
 
-    def steer(
-        self, point: tuple, first: int, count: int, value: float, end: float, cells: int
-    ) -> tuple[int, np.ndarray] | None:
-        """Do the same for an input that only loads depend on, by its places, see `jumps.steer`.
+    def steer(self, point: tuple, first: int, count: int, value: float, end: float) -> int | None:
+        """Do the same for an input that only loads depend on, by its places; return what `jumps.steer` does.
 
-        Returns
-        -------
-        (int, ndarray) or None
-            The code, and what stands in the cells then; None where that has to be done by `change`.
+        None where that has to be done by `change`.
         """
         steps = self._steered_behind()
         if not steps:
             return None
         t, rows, row = point[0], point[1], point[2]
-        values, at = np.empty(cells), row
-        if rows is not self.rows:
-            at = self._copied(rows, row)
-        code = self._steer_on(self.functions, self._at, t, at, first, count, value, end, values)
+        at = row if rows is self.rows else self._copied(rows, row)
+        code = self._steer_on(self.at, t, at, first, count, value, end)
         if code & CHANGED:
             self._given, self._jumped = None, (steps, t, rows, row)
-        return code, values
+        return code
 
     def steer_to(
-        self, point: tuple, first: int, count: int, value: float, end: float, cells: int, t: float, keep: bool
-    ) -> tuple[int, np.ndarray, tuple[Status, str] | None] | None:
-        """Steer, and go on to ``t``, in one compiled call; return what `steer` and what `go_to` returns, or None."""
-        steps, rows, row, at = self._steered_behind(), self.rows, self.row, point[2]
-        if not steps or point[1] is not rows:
+        self, point: tuple, first: int, count: int, value: float, hold: int, t: float, keep: bool
+    ) -> tuple[int, int] | None:
+        """Steer, at ``t`` with ``hold`` and else at once, and go on to ``t``, in one compiled call.
+
+        Returns
+        -------
+        (int, int)
+            What `steer` returns, and what `standing.go_next` does; None where it cannot be done so.
+        """
+        t_now, rows, at, _ = point
+        # at most points nothing is known of the last step that its coordinates could contradict
+        plain = self._given is None and self.last_records.changed_at < 0 and self.quick
+        steps = self.state.steps if plain else self._steered_behind()
+        if not steps or rows is not self.rows:
             return None
-        values = np.empty(cells)
-        code = self._steer_and_go_on(
-            self.functions, self._at, point[0], at, first, count, value, end, values, t, row, self._look_at
-        )
-        if code & (CHANGED << 2):
-            self._given, self._jumped = None, (steps, point[0], rows, at)
-        return code >> 2, values, self._arrive(code & 3, t, row, keep)
+        done = self._steer_next(self.at, t_now, at, first, count, value, hold, t, keep)
+        if done & CHANGED:
+            self._given, self._jumped = None, (steps, t_now, rows, at)
+        return done & 3, (done >> 2) - AHEAD
 
     def _steered_behind(self) -> int:
         """Return the steps behind which an input can be steered by compiled code, 0 where it cannot."""
@@ -484,12 +505,12 @@ class HeldRun(Run):
 
     def pack(self, row: int, block: np.ndarray) -> int:
         """Copy what the next steps depend on, and the point in a row; return the order of the last step."""
-        return self._pack(self._at, row, block)
+        return self._pack(self.at, row, block)
 
     def unpack(self, row: int, order: int, block: np.ndarray) -> None:
         """Put that back, and stand behind the last step, of an order, or 0 where it is given."""
         self._find_factors()
-        self._unpack(self._at, row, order, block)
+        self._unpack(self.at, row, order, block)
 
     def put_back(self, history: History) -> None:
         """Go on with a history; the tables are those of its state."""
@@ -525,7 +546,7 @@ class HeldRun(Run):
     def _stand_behind(self, last: LastStep | None) -> None:
         """Stand behind the last step, which may be given."""
         steps = self.state.steps
-        self._look_at = steps + LOOK
+        self._standing.look_at = steps + LOOK
         if self._watched:
             self.stall, self._watched = StallWatch(steps, self.state.t), False
         else:

@@ -90,14 +90,10 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
     ----------
     bound, st, plan, factors
         Of a run with no step open.
-    t : float
-        Within the last step.
-    y, yp : ndarray, shape (n,)
-        Values there.
-    cells : ndarray of int
-        Places in the table of numbers that change.
-    values : ndarray
-        What is to stand there.
+    t, y, yp : float, and ndarrays of shape (n,)
+        A time within the last step, and values there.
+    cells, values : ndarrays of int and of float
+        Places in the table of numbers that change, and what is to stand there.
     jumps, leads : bool
         Whether the equations change at once, b_0, and whether the change grows with the time, b_1.
     follows : bool
@@ -125,16 +121,14 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
     serves = known and _answer_serves(st, place, change)
     at = t + theta if leads else t
     bends = bent and follows and not known
-    if bends:
-        functions.residual(t, y, yp, st.delta, st.idata, st.rdata, st.work)
-    elif known and not serves:
+    if known and not serves:
         functions.residual(at, y, yp, first, st.idata, st.rdata, st.work)
-    elif follows and leads and not known:
+    elif follows and leads and not known and not bends:
         functions.residual(t + theta, y, yp, later, st.idata, st.rdata, st.work)
         if jumps:
             functions.residual(t, y, yp, st.delta, st.idata, st.rdata, st.work)
     if bends:
-        _exchange(st, cells, values)
+        moved = _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g)
     else:
         for k in range(cells.shape[0]):
             st.rdata[cells[k]] = values[k]
@@ -147,10 +141,7 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
             _find_answer(st, plan, factors, later, place, change)
             st.residuals += 2
         moved = _follow_known(st, t, change, d, g, leads)
-    elif bends:
-        moved = _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g)
-        st.residuals += 4
-    elif follows:
+    elif follows and not bends:
         if leads:
             functions.residual(t + theta, y, yp, st.res, st.idata, st.rdata, st.work)
             for i in range(n):
@@ -368,7 +359,18 @@ def _exchange(st, cells, values):
 def _change_beside(functions, st, t, yp, cells, values, now, out):
     """Write by how much a change of numbers makes more of the residual a little later, at ``st.y_pred``, than ``now``.
 
-    The new numbers are in place, the old ones in ``values``.
+    Parameters
+    ----------
+    functions, st
+        Of a run; the new numbers are in place.
+    t : float
+    yp : ndarray, shape (n,)
+    cells, values : ndarray
+        Places of the numbers, and the old ones.
+    now : ndarray, shape (n,)
+        By how much the change makes more of it now.
+    out : ndarray, shape (n,)
+        Written.
     """
     old = st.yp_pred
     functions.residual(t, st.y_pred, yp, out, st.idata, st.rdata, st.work)
@@ -389,7 +391,7 @@ def _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g):
     Parameters
     ----------
     st
-        With the new numbers in place, the old ones in ``values``, and in ``delta`` what the residual was with them.
+        With the old numbers in place, the new ones in ``values``; afterwards they are in both.
 
     Returns
     -------
@@ -398,7 +400,10 @@ def _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g):
     """
     n, gamma = st.y.shape[0], st.gamma_factored
     first, later, jump, at = g[TERMS], g[TERMS + 1], st.yp_between, st.y_pred
+    functions.residual(t, st.y, yp, st.delta, st.idata, st.rdata, st.work)
+    _exchange(st, cells, values)
     functions.residual(t, st.y, yp, first, st.idata, st.rdata, st.work)
+    st.residuals += 4
     for i in range(n):
         jump[i] = first[i] - st.delta[i]
     solve(plan, factors, first, d)

@@ -110,10 +110,13 @@ class Laid(Continued, Protocol):
     layout: Layout
     words: int
     itself: ref
-    row: int
     crossings: list[tuple[float, int]]
     told: dict[int, float]
     last_records: Any
+
+    @property
+    def row(self) -> int:
+        """Of the next point."""
 
     def pack(self, row: int, block: np.ndarray) -> int:
         """Copy its memory, see `standing.pack`."""

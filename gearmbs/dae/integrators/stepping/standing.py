@@ -6,18 +6,18 @@ would take longer than some steps of a small model do.
 
 from __future__ import annotations
 
-from numba import float64, int64, types
+from numba import boolean, float64, int64, types
 
 from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.run_state import STATE_TYPE, WINDOW, copy
 from gearmbs.dae.integrators.stepping.jumps import steer
-from gearmbs.dae.integrators.stepping.reach import reach, stand_behind
+from gearmbs.dae.integrators.stepping.reach import REACHED, reach, stand_behind
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.kernels.bound import FUNCTIONS_TYPE
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.placed import struct_at
+from gearmbs.kernels.placed import counted_at, place_of, struct_at
 from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 from gearmbs.kernels.views import matrix_at, vector_at
 
@@ -27,6 +27,12 @@ class Standing(Struct):
 
     Attributes
     ----------
+    state, part, plan, factors, functions, advance : int
+        Addresses.
+    row, first, count : int
+        The row of the next point, the first that is not kept, and how many there are.
+    look_at : int
+        Steps from which on somebody has to look at how the run gets on.
     scalars, part_scalars : ndarray
         Those of the state, and of the part that is solved at an instant.
     numbers : ndarray
@@ -35,6 +41,8 @@ class Standing(Struct):
         Those of the factors.
     cells : ndarray of int
         Places of named numbers in the table of numbers.
+    values : ndarray
+        Scratch: what is to stand there.
     places : ndarray of int, shape (3 p,)
         Places of inputs among the cells: of the time before the coefficients, and the number of these.
     scratch : ndarray
@@ -45,12 +53,18 @@ class Standing(Struct):
     part: int
     plan: int
     factors: int
+    functions: int
     advance: int
+    row: int
+    first: int
+    count: int
+    look_at: int
     scalars: Vector
     part_scalars: Vector
     numbers: Vector
     factor_numbers: Vector
     cells: IntVector
+    values: Vector
     places: IntVector
     scratch: Matrix
 
@@ -60,55 +74,84 @@ state_at = struct_at(STATE_TYPE)
 part_at = struct_at(PART_TYPE)
 plan_at = struct_at(PLAN_TYPE)
 factors_at = struct_at(FACTORS_TYPE)
+functions_at = counted_at(FUNCTIONS_TYPE)
 
+AHEAD = 4
+"""More than the codes of `go_next` are less than zero."""
 _VEC = float64[::1]
 
 
-@njit(
-    int64(FUNCTIONS_TYPE, int64, float64, int64, int64),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def go_on(bound, standing, t, row, last):
-    """Go on to a time as `reach` does; return what it does.
+@njit(int64(FUNCTIONS_TYPE), cache=True, nogil=True, error_model="numpy")
+def place_of_functions(bound):
+    """Return the address of the functions of a DAE; what binds them has to outlive its use."""
+    return place_of(bound)
+
+
+@njit(int64(int64, float64), cache=True, nogil=True, error_model="numpy")
+def go_on(standing, t):
+    """Go on to a time as `reach` does, and write the point to the next row; return what it does.
 
     Parameters
     ----------
-    bound
-        The functions of the DAE.
     standing : int
         Address of the run's `Standing`.
-    t, row, last
+    t : float
         As of `reach`.
     """
     own = standing_at(standing)
     return reach(
-        bound,
+        functions_at(own.functions),
         state_at(own.state),
         part_at(own.part),
         plan_at(own.plan),
         factors_at(own.factors),
         own.advance,
         t,
-        row,
-        last,
+        own.row,
+        own.look_at,
     )
 
 
+@njit(int64(int64, float64, boolean), cache=True, nogil=True, error_model="numpy")
+def go_next(standing, t, keep):
+    """Go on as `go_on` does, and let the point be the present one, as `HeldRun` does at most points.
+
+    Parameters
+    ----------
+    standing, t
+        As of `go_on`.
+    keep : bool
+        Whether the point is to be kept: else the next but one is written over it.
+
+    Returns
+    -------
+    row : int
+        The row of the point; -1 less what `go_on` returns where something is left to do.
+    """
+    code = go_on(standing, t)
+    own = standing_at(standing)
+    row = own.row
+    if code != REACHED or row + 2 >= own.count:
+        return -1 - code
+    if keep:
+        own.first = row + 1
+        own.row = row + 1
+    else:
+        own.row = own.first + 1 if row == own.first else own.first
+    return row
+
+
 @njit(
-    int64(FUNCTIONS_TYPE, int64, float64, int64, int64, int64, float64, float64, _VEC),
+    int64(int64, float64, int64, int64, int64, float64, float64),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def steer_on(bound, standing, t, row, first, count, value, end, values):
+def steer_on(standing, t, row, first, count, value, end):
     """Steer as `steer` does; return what it does.
 
     Parameters
     ----------
-    bound
-        The functions of the DAE.
     standing : int
         Address of the run's `Standing`.
     t : float
@@ -117,13 +160,13 @@ def steer_on(bound, standing, t, row, first, count, value, end, values):
         Of the outputs: where the values at ``t`` stand.
     first, count : int
         The first of the input's places among all, and how many there are.
-    value, end, values
+    value, end
         As of `steer`.
     """
     own = standing_at(standing)
     st = state_at(own.state)
     return steer(
-        bound,
+        functions_at(own.functions),
         st,
         plan_at(own.plan),
         factors_at(own.factors),
@@ -134,32 +177,31 @@ def steer_on(bound, standing, t, row, first, count, value, end, values):
         value,
         end,
         own.cells,
-        values,
+        own.values,
         own.scratch,
     )
 
 
 @njit(
-    int64(FUNCTIONS_TYPE, int64, float64, int64, int64, int64, float64, float64, _VEC, float64, int64, int64),
+    int64(int64, float64, int64, int64, int64, float64, int64, float64, boolean),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def steer_and_go_on(bound, standing, t, row, first, count, value, end, values, t_next, row_next, last):
-    """Steer, then go on to another time, in one call; return four times what `steer` does and what `reach` does.
+def steer_next(standing, t, row, first, count, value, hold, t_next, keep):
+    """Steer, then go on to another time; return what `steer` does, and 4 times `AHEAD` more than what `go_next` does.
 
     Parameters
     ----------
-    bound, standing, t, row, first, count, value, end, values
+    standing, t, row, first, count, value
         As of `steer_on`.
-    t_next, row_next, last
-        As of `reach`.
+    hold : int
+        Whether it goes there evenly until ``t_next``, or jumps.
+    t_next, keep
+        As of `go_next`.
     """
-    own = standing_at(standing)
-    st, plan, factors = state_at(own.state), plan_at(own.plan), factors_at(own.factors)
-    steered = steer_on(bound, standing, t, row, first, count, value, end, values)
-    went = reach(bound, st, part_at(own.part), plan, factors, own.advance, t_next, row_next, last)
-    return 4 * steered + went
+    steered = steer_on(standing, t, row, first, count, value, t_next if hold else t)
+    return steered + 4 * (AHEAD + go_next(standing, t_next, keep))
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
