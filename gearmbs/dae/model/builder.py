@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -31,7 +32,7 @@ class TableBuilder:
         self.bodies: list[np.ndarray] = []
         self.kinds: list[BodyKind] = []
         self.modes: list[int] = []
-        self.modal: list[float] = []
+        self.modal = array("d")
         self.modal_at: list[int] = []
         self.modal_inertia: list[ModalInertia | None] = []
         self.frame_body: list[int] = []
@@ -88,9 +89,9 @@ class TableBuilder:
         self.bodies.append(np.concatenate([[mass], np.asarray(inertia, dtype=float).ravel()]))
         self.modes.append(0 if modal is None else modal.modes)
         self.modal_inertia.append(modal)
-        own = list(numbers) if modal is None else modal.table(inertia).tolist()
-        self.modal_at.append(len(self.modal) if own else -1)
-        self.modal.extend(own)
+        own = np.asarray(numbers, dtype=float) if modal is None else modal.table(inertia)
+        self.modal_at.append(len(self.modal) if own.size else -1)
+        self.modal.frombytes(own.tobytes())
         return len(self.bodies) - 1
 
     def add_marker(
@@ -108,7 +109,7 @@ class TableBuilder:
             # the marker of such a body is the origin of a frame of its own
             self.frame_body.append(body)
             self.shape_at.append(len(self.modal))
-            self.modal.extend(shape_table(position, *shape).tolist())
+            self.modal.frombytes(shape_table(position, *shape).tobytes())
             body, position = len(self.bodies) + len(self.frame_body) - 1, np.zeros(3)
         self.marker_body.append(body)
         self.marker_frame.append(np.concatenate([position, np.asarray(orientation, dtype=float).ravel()]))

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from gearmbs.dae.equations.bodies import MODAL
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
+from gearmbs.dae.equations.bodies.lane_lists import ROUNDING
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.quantities import Vector
@@ -24,8 +25,8 @@ COUPLING = ("full", "partial", "constant")
 """How much of the coupling between deformation and motion of the frame is kept, see `ShapeIntegrals.coupled`."""
 
 
-ROUNDING = 1e-12
-"""Share of their bounds below which integrals, and of the largest below which shapes, are rounding errors."""
+SHAPE_ROUNDING = 1e-12
+"""Share of the largest below which shapes at a marker are rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -365,7 +366,7 @@ class ModalBody(Body):
 
 def _rounded(shape: np.ndarray) -> np.ndarray:
     """Return shapes at a marker with zeros in place of their rounding errors: entries that vanish need no equations."""
-    return np.where(np.abs(shape) > ROUNDING * np.abs(shape).max(initial=0.0), shape, 0.0)
+    return np.where(np.abs(shape) > SHAPE_ROUNDING * np.abs(shape).max(initial=0.0), shape, 0.0)
 
 
 def make_modal_body(

@@ -11,11 +11,11 @@ from __future__ import annotations
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.inertia import (
     add_momentum,
-    modal_body_entries,
     modal_residual,
     set_modal_momenta,
     update_inertia,
 )
+from gearmbs.dae.equations.bodies.inertia_entries import modal_body_entries
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
 from gearmbs.dae.equations.rotation import (
     KIN_A,

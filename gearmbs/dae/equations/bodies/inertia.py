@@ -1,6 +1,7 @@
 """Integrals over a body of its shapes, and the table in which the kernels read them.
 
-What the present state of a body is summed from stands in lanes, neighbouring modes side by side.
+What the present state of a body is summed from, and the state itself, stands in lanes, with modes side by side that
+have much in common; see `gearmbs.dae.equations.bodies.lane_lists`.
 """
 
 from __future__ import annotations
@@ -12,31 +13,35 @@ import numpy as np
 from numba import types
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.bodies.lane_lists import in_lanes, lanes_of, listed_sum, padded
+from gearmbs.dae.equations.bodies.lane_lists import in_lanes, lanes_of, listed_sum, padded, without_rounding
 from gearmbs.dae.equations.constraints.terms import dot3
-from gearmbs.dae.equations.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_H, KIN_W
-from gearmbs.dae.equations.unknowns import put
+from gearmbs.dae.equations.rotation import KIN_A, KIN_H, KIN_W
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import LANES, lanes_at, put_lanes
-from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
-from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
+from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, put_lanes
+from gearmbs.kernels.pointers import IVEC, VEC
+from gearmbs.kernels.structs import matrix_at, vector_at
 
 APART = 9
 """Behind J0 in the head of the table: 1 if M, K and D are diagonal."""
 LISTED = 10
 """How many lanes are listed."""
-GATHERED = 11
-"""1 if these lanes are of modes that have much in common instead of neighbours."""
-PAIRED = 12
+PAIRED = 11
 """How many entries two modes, or a mode and itself, have: of p_f by q_f, p_f by v_f, v_f by q_f, and v_f by v_f."""
-HEAD = 16
+HEAD = 15
 """Numbers before the integrals."""
 
 SYMMETRIC = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Entries of a symmetric matrix in the order in which they are stored."""
+SQUARES = [k for k, (row, column) in enumerate(SYMMETRIC) if row == column]
+"""Which of them are on the diagonal. Of J2 these are summed as second moments, 1/2 tr J2 - J2_xx and so on: of two
+modes that bend in one plane J2 has three, of which one moment vanishes and another is that of the rotary inertia."""
 
 PRESENT = 12
 """Numbers a mode that a body's present state takes: dJ/dq_k (6), H_k (3), sum_l C1_kl v_l (3)."""
+PASSING = 2
+"""Numbers a mode that come and go beside it: q_k and v_k, later what turning adds to the force and the momentum."""
+SUMS = 6
+"""Lanes of sums over modes behind them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,29 +114,35 @@ class ModalInertia:
         )  # fmt: skip
         # mode l, then mode k of each: of one l after the other, whose integrals stand in a row
         pairs = [np.nonzero(between.T) for between in entries]
-        order, lists = in_lanes(np.concatenate([second, turned], axis=1))
+        summed = np.concatenate([second, turned], axis=1)
+        squares = np.diagonal(self.j2, axis1=2, axis2=3)
+        moments = without_rounding(0.5 * squares.sum(axis=2, keepdims=True) - squares, self.mass)
+        summed[:, SQUARES] = moments.swapaxes(1, 2)
+        places, lists = in_lanes(summed)
         head = np.zeros(HEAD)
         head[:APART] = np.ravel(inertia)
-        head[APART], head[LISTED], head[GATHERED] = apart, len(lists[1]), len(order) > 0
+        head[APART], head[LISTED] = apart, len(lists[1])
         head[PAIRED:] = [len(modes) for modes, _ in pairs]
+        gathered = np.empty_like(first)
+        gathered[:, places] = first
         diagonals = [padded(np.diag(part)) for part in parts]
         pieces: tuple = (
             head,
-            padded(first),
+            padded(gathered),
             second,
             turned,
             *parts,
             *diagonals,
             *lists,
-            order,
+            places,
             *itertools.chain(*pairs),
         )
         return np.concatenate([np.ravel(piece) for piece in pieces])
 
 
 def present_size(modes: int) -> int:
-    """Return how many numbers the present state of a body takes, with room for one of its rows."""
-    return (PRESENT + 1) * LANES * lanes_of(modes)
+    """Return how many numbers the present state of a body takes, with what comes and goes beside it."""
+    return LANES * ((PRESENT + PASSING) * lanes_of(modes) + SUMS)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -173,7 +184,7 @@ def moving(modal, at, n):
     head : ndarray, shape (HEAD,)
         J0, 1 if M, K and D are diagonal, and how many lanes are listed.
     first : ndarray, shape (9 stride,)
-        J1 (entries of `SYMMETRIC`, then modes) and C0.
+        J1 (entries of `SYMMETRIC`, then modes) and C0; modes as in the state.
     counts : ndarray, shape (PRESENT stride / LANES,)
         For each lanes of the state how many modes l add to them.
     modes : ndarray
@@ -181,7 +192,7 @@ def moving(modal, at, n):
     blocks : ndarray
         What their coordinates, in the last quarter of the state their velocities, are multiplied by.
     places : ndarray, shape (n,)
-        Where the modes stand in these lanes; see `GATHERED`.
+        Where the modes stand in these lanes.
     """
     wide = stride(n)
     head = vector_at(modal, at, HEAD)
@@ -194,8 +205,16 @@ def moving(modal, at, n):
         vector_at(modal, counts, PRESENT * (wide // LANES)),
         vector_at(modal, modes, listed),
         vector_at(modal, modes + listed, LANES * listed),
-        vector_at(modal, modes + (1 + LANES) * listed, n if head[GATHERED] > 0.0 else 0),
+        vector_at(modal, modes + (1 + LANES) * listed, n),
     )
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def places_in(modal, at, n):
+    """Return where the modes stand in a body's present state, as a view; see `moving`."""
+    wide = stride(n)
+    modes = at + HEAD + 12 * wide + 15 * n * n + PRESENT * (wide // LANES)
+    return vector_at(modal, modes + (1 + LANES) * int(modal[at + LISTED]), n)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -208,7 +227,10 @@ def diagonals(modal, at, n):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def present(partial, at, n):
-    """Return dJ/dq (6, n), H (3, n) and sum_l C1_kl v_l (3, n) of a body at present as views, n filled up to lanes."""
+    """Return dJ/dq (6, n), H (3, n) and sum_l C1_kl v_l (3, n) of a body at present as views.
+
+    Modes stand as `places_in` says, filled up to lanes.
+    """
     wide = stride(n)
     h = at + 6 * wide
     return matrix_at(partial, at, 6, wide), matrix_at(partial, h, 3, wide), matrix_at(partial, h + 3 * wide, 3, wide)
@@ -255,50 +277,97 @@ def to_global(kin_row, v, i, out, k):
         out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def passing(partial, at, n):
+    """Return the rows of `PASSING` and the room for lanes of sums, as views."""
+    wide = stride(n)
+    rows = at + PRESENT * wide
+    sums = vector_at(partial, rows + PASSING * wide, SUMS * LANES)
+    return vector_at(partial, rows, wide), vector_at(partial, rows + wide, wide), sums
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def lanes_total(sums, m):
+    """Return the sum of what stands in lanes ``m``."""
+    total = 0.0
+    for k in range(LANES * m, LANES * (m + 1)):
+        total += sums[k]
+    return total
+
+
 @njit(types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy", fastmath={"contract"})
 def update_inertia(y, at, modal, partial, body_row):
-    """Write J(q) to the body's row and dJ/dq, H and sum_l C1_kl v_l to its place in ``partial``."""
+    """Write J(q) to the body's row and dJ/dq, H and sum_l C1_kl v_l to its place in ``partial``, and q and v behind."""
     n, place = at[T.AT_MODES], at[T.AT_PARTIAL]
     wide = stride(n)
     head, first, counts, modes, blocks, places = moving(modal, at[T.AT_MODAL], n)
     state = vector_at(partial, place, PRESENT * wide)
-    row = vector_at(partial, place + PRESENT * wide, wide)
+    q_f, v_f, sums = passing(partial, place, n)
     amounts, rates = vector_at(y, at[T.AT_QF], n), vector_at(y, at[T.AT_VF], n)
+    for k in range(n, wide):
+        q_f[k] = v_f[k] = 0.0
+    for k in range(n):
+        j = int(places[k])
+        q_f[j], v_f[j] = amounts[k], rates[k]
     lanes, e = wide // LANES, 0
     for b in range(counts.size):
-        count, inner = int(counts[b]), b < 9 * lanes
-        total = listed_sum(modes, blocks, e, count, amounts if inner else rates)
+        count = int(counts[b])
+        put_lanes(state, b, listed_sum(modes, blocks, e, count, amounts if b < 9 * lanes else rates))
         e += count
-        if places.size == 0:
-            put_lanes(state, b, lanes_at(first, b) + total if inner else total)
-            continue
-        put_lanes(row, b % lanes, total)
-        if b % lanes == lanes - 1:
-            own = LANES * (b + 1) - wide
-            for k in range(n):
-                state[own + k] = row[int(places[k])]
-            for g in range(b + 1 - lanes, b + 1 if inner else 0):
-                put_lanes(state, g, lanes_at(first, g) + lanes_at(state, g))
-    add_inertia_change(amounts, matrix_at(first, 0, 6, wide), matrix_at(state, 0, 6, wide), head, body_row)
+    add_inertia_change(q_f, first, state, head, sums, body_row)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def add_inertia_change(q_f, j1, change, j0, body_row):
-    """Write J(q) = J0 + 1/2 sum_k q_k (J1_k + dJ/dq_k) to a body's row; all six sums advance together."""
-    xx = xy = xz = yy = yz = zz = 0.0
-    for k in range(q_f.size):
-        amount = 0.5 * q_f[k]
-        xx += amount * (j1[0, k] + change[0, k])
-        xy += amount * (j1[1, k] + change[1, k])
-        xz += amount * (j1[2, k] + change[2, k])
-        yy += amount * (j1[3, k] + change[3, k])
-        yz += amount * (j1[4, k] + change[4, k])
-        zz += amount * (j1[5, k] + change[5, k])
+def add_inertia_change(q_f, first, state, j0, sums, body_row):
+    """Complete dJ/dq and H, and write J(q) = J0 + 1/2 sum_k q_k (J1_k + dJ/dq_k) to a body's row.
+
+    Parameters
+    ----------
+    q_f : ndarray
+        Modal coordinates as they stand in the state.
+    first, state
+        As of `moving`; sums over the modes l in the state, of J2 as second moments, see `SQUARES`.
+    j0, sums, body_row : ndarray
+        J0; `SUMS` lanes, written; the body's row.
+    """
+    xx, xy, xz = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+    yy, yz, zz = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+    lanes = q_f.size // LANES
+    for g in range(lanes):
+        moved = 0.5 * lanes_at(q_f, g)
+        along_x, along_y, along_z = lanes_at(state, g), lanes_at(state, 3 * lanes + g), lanes_at(state, 5 * lanes + g)
+        put_lanes(state, g, along_y + along_z)
+        put_lanes(state, 3 * lanes + g, along_x + along_z)
+        put_lanes(state, 5 * lanes + g, along_x + along_y)
+        xx = xx + moved * complete(first, state, g)
+        xy = xy + moved * complete(first, state, lanes + g)
+        xz = xz + moved * complete(first, state, 2 * lanes + g)
+        yy = yy + moved * complete(first, state, 3 * lanes + g)
+        yz = yz + moved * complete(first, state, 4 * lanes + g)
+        zz = zz + moved * complete(first, state, 5 * lanes + g)
+        for m in range(6, 9):
+            complete(first, state, m * lanes + g)
+    put_lanes(sums, 0, xx)
+    put_lanes(sums, 1, xy)
+    put_lanes(sums, 2, xz)
+    put_lanes(sums, 3, yy)
+    put_lanes(sums, 4, yz)
+    put_lanes(sums, 5, zz)
     i = T.BODY_INERTIA
-    body_row[i], body_row[i + 4], body_row[i + 8] = j0[0] + xx, j0[4] + yy, j0[8] + zz
-    body_row[i + 1] = body_row[i + 3] = j0[1] + xy
-    body_row[i + 2] = body_row[i + 6] = j0[2] + xz
-    body_row[i + 5] = body_row[i + 7] = j0[5] + yz
+    body_row[i], body_row[i + 4] = j0[0] + lanes_total(sums, 0), j0[4] + lanes_total(sums, 3)
+    body_row[i + 8] = j0[8] + lanes_total(sums, 5)
+    body_row[i + 1] = body_row[i + 3] = j0[1] + lanes_total(sums, 1)
+    body_row[i + 2] = body_row[i + 6] = j0[2] + lanes_total(sums, 2)
+    body_row[i + 5] = body_row[i + 7] = j0[5] + lanes_total(sums, 4)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def complete(first, state, b):
+    """Add what does not depend on the modes l to lanes of the state; return twice the one and once the other."""
+    constant = lanes_at(first, b)
+    total = constant + lanes_at(state, b)
+    put_lanes(state, b, total)
+    return constant + total
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -313,14 +382,17 @@ def inertia_change(change, k, w, i, out, j):
 @njit(types.void(VEC, IVEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def add_momentum(y, at, partial, kin_row):
     """Add sum_k H_k v_k to the angular momentum h of the body's row."""
-    n, v = at[T.AT_MODES], at[T.AT_VF]
-    _, h, _ = present(partial, at[T.AT_PARTIAL], n)
-    x = y_ = z = 0.0
-    for k in range(n):
-        rate = y[v + k]
-        x += h[0, k] * rate
-        y_ += h[1, k] * rate
-        z += h[2, k] * rate
+    n = at[T.AT_MODES]
+    wide = stride(n)
+    h = vector_at(partial, at[T.AT_PARTIAL] + 6 * wide, 3 * wide)
+    _, v_f, sums = passing(partial, at[T.AT_PARTIAL], n)
+    lanes = wide // LANES
+    for m in range(3):
+        total = all_lanes(0.0)
+        for g in range(lanes):
+            total = total + lanes_at(h, m * lanes + g) * lanes_at(v_f, g)
+        put_lanes(sums, m, total)
+    x, y_, z = lanes_total(sums, 0), lanes_total(sums, 1), lanes_total(sums, 2)
     for c in range(3):
         a = KIN_A + 3 * c
         kin_row[KIN_H + c] += kin_row[a] * x + kin_row[a + 1] * y_ + kin_row[a + 2] * z
@@ -350,9 +422,11 @@ def set_modal_momenta(y, at, modal, partial, kin_row):
     _, _, mass, _, _ = integrals(modal, at[T.AT_MODAL], n)
     apart = has_diagonals(modal, at)
     _, h, _ = present(partial, at[T.AT_PARTIAL], n)
+    places = places_in(modal, at[T.AT_MODAL], n)
     wx, wy, wz = spin_in_body(kin_row)
     for k in range(n):
-        turning = h[0, k] * wx + h[1, k] * wy + h[2, k] * wz
+        j = int(places[k])
+        turning = h[0, j] * wx + h[1, j] * wy + h[2, j] * wz
         y[at[T.AT_PF] + k] = turning + row_product(mass, apart, k, y, at[T.AT_VF])
 
 
@@ -370,72 +444,57 @@ def modal_residual(y, yp, at, modal, partial, kin_row, out):
         The body's row of the kinematics table; the residual.
     """
     n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
+    inertial, turning, _ = passing(partial, at[T.AT_PARTIAL], n)
+    set_turning_terms(partial, at[T.AT_PARTIAL], n, spin_in_body(kin_row), inertial, turning)
+    places = places_in(modal, at[T.AT_MODAL], n)
+    if has_diagonals(modal, at):
+        diagonal_rows(y, yp, at, modal, places, inertial, turning, out)
+        return
     _, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
-    change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
-    apart = has_diagonals(modal, at)
-    spin = spin_in_body(kin_row)
-    first = diagonal_rows(y, yp, at, modal, partial, spin, out) if apart else 0
-    for k in range(first, n):
-        tensor = change[0, k], change[1, k], change[2, k], change[3, k], change[4, k], change[5, k]
-        inertial = inertial_force(tensor, (gyro[0, k], gyro[1, k], gyro[2, k]), spin)
-        force = row_product(stiffness, apart, k, y, qf) + row_product(damping, apart, k, y, vf) - inertial
-        momentum = spin[0] * h[0, k] + spin[1] * h[1, k] + spin[2] * h[2, k] + row_product(mass, apart, k, y, vf)
+    for k in range(n):
+        j = int(places[k])
+        force = row_product(stiffness, False, k, y, qf) + row_product(damping, False, k, y, vf) - inertial[j]
         out[pf + k] = yp[pf + k] + force
-        out[vf + k] = y[pf + k] - momentum
+        out[vf + k] = y[pf + k] - turning[j] - row_product(mass, False, k, y, vf)
         out[qf + k] = y[vf + k] - yp[qf + k]
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def inertial_force(change, gyro, spin):
-    """Return 1/2 w . dJ/dq_k w + w . sum_l C1_kl v_l of one mode, or of as many as lanes have.
-
-    Parameters
-    ----------
-    change, gyro : tuple
-        dJ/dq_k, entries of `SYMMETRIC`, and sum_l C1_kl v_l.
-    spin : tuple of float
-        w.
-    """
+def set_turning_terms(partial, at, n, spin, inertial, turning):
+    """Write 1/2 w . dJ/dq_k w + w . sum_l C1_kl v_l and w . H_k of all modes as they stand in the state."""
+    row = stride(n) // LANES
+    state = vector_at(partial, at, PRESENT * row * LANES)
     wx, wy, wz = spin
-    inertial = 0.5 * (change[0] * wx * wx + change[3] * wy * wy + change[5] * wz * wz)
-    inertial = inertial + (change[1] * wx * wy + change[2] * wx * wz + change[4] * wy * wz)
-    return inertial + (wx * gyro[0] + wy * gyro[1] + wz * gyro[2])
+    for g in range(row):
+        squares = lanes_at(state, g) * (wx * wx) + lanes_at(state, 3 * row + g) * (wy * wy)
+        squares = squares + lanes_at(state, 5 * row + g) * (wz * wz)
+        products = lanes_at(state, row + g) * (wx * wy) + lanes_at(state, 2 * row + g) * (wx * wz)
+        products = products + lanes_at(state, 4 * row + g) * (wy * wz)
+        gyro = lanes_at(state, 9 * row + g) * wx + lanes_at(state, 10 * row + g) * wy
+        gyro = gyro + lanes_at(state, 11 * row + g) * wz
+        put_lanes(inertial, g, 0.5 * squares + products + gyro)
+        momentum = lanes_at(state, 6 * row + g) * wx + lanes_at(state, 7 * row + g) * wy
+        put_lanes(turning, g, momentum + lanes_at(state, 8 * row + g) * wz)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def diagonal_rows(y, yp, at, modal, partial, spin, out):
-    """Write the rows of `modal_residual` for modes that fill lanes, if M, K and D are diagonal; return their number.
+def diagonal_rows(y, yp, at, modal, places, inertial, turning, out):
+    """Write the rows of `modal_residual` if M, K and D are diagonal.
 
     Parameters
     ----------
-    y, yp, at, modal, partial, out
+    y, yp, at, modal, out
         As of `modal_residual`.
-    spin : tuple of float
-        Angular velocity in body components.
+    places, inertial, turning : ndarray
+        Of `places_in` and `set_turning_terms`.
     """
     n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
     mass, stiffness, damping = diagonals(modal, at[T.AT_MODAL], n)
-    momenta, rates, amounts = vector_at(y, pf, n), vector_at(y, vf, n), vector_at(y, qf, n)
-    momenta_rates, amounts_rates = vector_at(yp, pf, n), vector_at(yp, qf, n)
-    forces, momenta_rows, rates_rows = vector_at(out, pf, n), vector_at(out, vf, n), vector_at(out, qf, n)
-    row = stride(n) // LANES
-    state = vector_at(partial, at[T.AT_PARTIAL], PRESENT * row * LANES)
-    wx, wy, wz = spin
-    for g in range(n // LANES):
-        tensor = (
-            lanes_at(state, g), lanes_at(state, row + g), lanes_at(state, 2 * row + g), lanes_at(state, 3 * row + g),
-            lanes_at(state, 4 * row + g), lanes_at(state, 5 * row + g),
-        )  # fmt: skip
-        gyro = lanes_at(state, 9 * row + g), lanes_at(state, 10 * row + g), lanes_at(state, 11 * row + g)
-        rate = lanes_at(rates, g)
-        force = lanes_at(stiffness, g) * lanes_at(amounts, g) + lanes_at(damping, g) * rate
-        force = force - inertial_force(tensor, gyro, spin)
-        momentum = wx * lanes_at(state, 6 * row + g) + wy * lanes_at(state, 7 * row + g)
-        momentum = momentum + wz * lanes_at(state, 8 * row + g) + lanes_at(mass, g) * rate
-        put_lanes(forces, g, lanes_at(momenta_rates, g) + force)
-        put_lanes(momenta_rows, g, lanes_at(momenta, g) - momentum)
-        put_lanes(rates_rows, g, rate - lanes_at(amounts_rates, g))
-    return n // LANES * LANES
+    for k in range(n):
+        j, rate = int(places[k]), y[vf + k]
+        out[pf + k] = yp[pf + k] + stiffness[k] * y[qf + k] + damping[k] * rate - inertial[j]
+        out[vf + k] = y[pf + k] - turning[j] - mass[k] * rate
+        out[qf + k] = rate - yp[qf + k]
 
 
 @njit(cache=True, error_model="numpy")
@@ -460,16 +519,17 @@ def modal_acceleration_terms(y, at, modal, partial, kin_row, mass_out, coupling_
     n, vf, qf = at[T.AT_MODES], at[T.AT_VF], at[T.AT_QF]
     second, _, mass, stiffness, damping = integrals(modal, at[T.AT_MODAL], n)
     change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
-    apart = has_diagonals(modal, at)
+    places, apart = places_in(modal, at[T.AT_MODAL], n), has_diagonals(modal, at)
     s = np.zeros(12)
     to_body(kin_row, kin_row, KIN_W, s, 0)
     for k in range(n):
-        inertia_change(change, k, s, 0, s, 3)
+        j = int(places[k])
+        inertia_change(change, j, s, 0, s, 3)
         total = 0.5 * dot3(s, 0, s, 3)
         for c in range(3):
-            total += s[c] * gyro[c, k]
-            s[9 + c] -= y[vf + k] * (s[3 + c] + gyro[c, k])
-            s[6 + c] = h[c, k]
+            total += s[c] * gyro[c, j]
+            s[9 + c] -= y[vf + k] * (s[3 + c] + gyro[c, j])
+            s[6 + c] = h[c, j]
         for l in range(n):
             mass_out[k, l] = mass[k, l]
             for c in range(3):
@@ -479,112 +539,3 @@ def modal_acceleration_terms(y, at, modal, partial, kin_row, mass_out, coupling_
         for c in range(3):
             coupling_out[k, c] = s[3 + c]
     to_global(kin_row, s, 9, rhs_rotation, 0)
-
-
-# Newton-matrix entries of a body with modal coordinates: inertia, stiffness and damping of its modes.
-
-
-@njit(I8(I8, F8, VEC, IVEC, VEC, VEC, VEC, VEC, IVEC, VEC, I8), cache=True, late=True, error_model="numpy")
-def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, s, slot, vals, k):
-    """Hand over the entries of a body's modal inertia, stiffness and damping; return the number of the next entry.
-
-    Entries whose integrals are all zero, and stay so, are left out.
-
-    Parameters
-    ----------
-    mode, slot, vals, k
-        As of `gearmbs.dae.equations.unknowns.put`.
-    cj : float
-        Factor of y'.
-    at, modal, partial, kin_row
-        The body's places, the table of all integrals, the present state, its row of the kinematics table.
-    s : ndarray
-        Scratch, 30 places.
-    """
-    slot, vals, s = uncounted(slot), uncounted(vals), uncounted(s)
-    at, modal, partial, kin_row = uncounted(at), uncounted(modal), uncounted(partial), uncounted(kin_row)
-    n, p, e, th = at[T.AT_MODES], at[T.AT_P], at[T.AT_EPS], at[T.AT_THETA]
-    pf, vf, qf = at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
-    change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
-    to_body(kin_row, kin_row, KIN_W, s, 0)
-    for c in range(3):
-        to_body(kin_row, kin_row, KIN_AXES + 3 * c, s, 12 + 3 * c)
-        to_body(kin_row, kin_row, KIN_ADOT + 3 * c, s, 21 + 3 * c)
-    for i in range(n):
-        inertia_change(change, i, s, 0, s, 3)
-        for c in range(3):
-            s[3 + c] += gyro[c, i]
-            s[6 + c] = h[c, i]
-        k = put(mode, slot, vals, k, pf + i, pf + i, cj)
-        k = put(mode, slot, vals, k, vf + i, pf + i, 1.0)
-        k = put(mode, slot, vals, k, qf + i, vf + i, 1.0)
-        k = put(mode, slot, vals, k, qf + i, qf + i, -cj)
-        for c in range(3):
-            axis, rate = 12 + 3 * c, 21 + 3 * c
-            # dh/dq_i in s[3:6], dh/dv_i = H_i in s[6:9]
-            along, about = dot3(s, axis, s, 3), dot3(s, axis, s, 6)
-            along_rate, about_rate = dot3(s, rate, s, 3), dot3(s, rate, s, 6)
-            k = put(mode, slot, vals, k, p + c, qf + i, -along_rate)
-            k = put(mode, slot, vals, k, p + c, vf + i, -about_rate)
-            k = put(mode, slot, vals, k, e + c, qf + i, -along)
-            k = put(mode, slot, vals, k, e + c, vf + i, -about)
-            k = put(mode, slot, vals, k, pf + i, e + c, -along)
-            k = put(mode, slot, vals, k, pf + i, th + c, -along_rate)
-            k = put(mode, slot, vals, k, vf + i, e + c, -about)
-            k = put(mode, slot, vals, k, vf + i, th + c, -about_rate)
-    return pair_entries(mode, at, modal, s, slot, vals, k)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def listed_pairs(modal, at, n, kind):
-    """Return the entries of a kind, see `PAIRED`, between two modes: mode l and mode k of each."""
-    head, lanes = vector_at(modal, at, HEAD), stride(n) // LANES
-    first = at + HEAD + 12 * LANES * lanes + 15 * n * n + PRESENT * lanes + (1 + LANES) * int(head[LISTED])
-    first += n if head[GATHERED] > 0.0 else 0
-    for before in range(kind):
-        first += 2 * int(head[PAIRED + before])
-    count = int(head[PAIRED + kind])
-    return vector_at(modal, first, count), vector_at(modal, first + count, count)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def pair_entries(mode, at, modal, s, slot, vals, k):
-    """Hand over the entries between modes, kind by kind and without a look at those that vanish; return as `put` does.
-
-    Parameters
-    ----------
-    mode, slot, vals, k
-        As of `gearmbs.dae.equations.unknowns.put`.
-    at, modal : ndarray
-        The body's places, the table of all integrals.
-    s : ndarray
-        Angular velocity in body components in ``s[0:3]``.
-    """
-    n, pf, vf, qf = at[T.AT_MODES], at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
-    place = at[T.AT_MODAL]
-    second, turned, mass, stiffness, damping = integrals(modal, place, n)
-    x, y, z = s[0], s[1], s[2]
-    apart = has_diagonals(modal, at)
-    by, of = listed_pairs(modal, place, n, 0)
-    for e in range(by.size):
-        l, i = int(by[e]), int(of[e])
-        centrifugal = 0.5 * (second[l, i] * x * x + second[l, 3 * n + i] * y * y + second[l, 5 * n + i] * z * z)
-        centrifugal += second[l, n + i] * x * y + second[l, 2 * n + i] * x * z + second[l, 4 * n + i] * y * z
-        own = stiffness[i, l] if i == l or not apart else 0.0
-        k = put(mode, slot, vals, k, pf + i, qf + l, own - centrifugal)
-    by, of = listed_pairs(modal, place, n, 1)
-    for e in range(by.size):
-        l, i = int(by[e]), int(of[e])
-        gyro = x * turned[l, i] + y * turned[l, n + i] + z * turned[l, 2 * n + i]
-        own = damping[i, l] if i == l or not apart else 0.0
-        k = put(mode, slot, vals, k, pf + i, vf + l, own - gyro)
-    by, of = listed_pairs(modal, place, n, 2)
-    for e in range(by.size):
-        l, i = int(by[e]), int(of[e])
-        mixed = x * second[l, 6 * n + i] + y * second[l, 7 * n + i] + z * second[l, 8 * n + i]
-        k = put(mode, slot, vals, k, vf + i, qf + l, -mixed)
-    by, of = listed_pairs(modal, place, n, 3)
-    for e in range(by.size):
-        l, i = int(by[e]), int(of[e])
-        k = put(mode, slot, vals, k, vf + i, vf + l, -mass[i, l])
-    return k

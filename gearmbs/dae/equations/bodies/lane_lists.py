@@ -11,8 +11,9 @@ import numpy as np
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at
 
-MOVED = 2
-"""What it costs to bring the sum for a gathered mode to its place, in listed lanes, measured."""
+ROUNDING = 1e-9
+"""Share of its bound up to which an integral of shapes is rounding. Of a shaft with 102 modes, the stiffest 7000 times
+as stiff as the softest, those that vanish by symmetry come out up to 3e-10 of it, all others above 1.5e-5."""
 
 
 def lanes_of(modes: int) -> int:
@@ -26,17 +27,22 @@ def padded(rows: np.ndarray) -> np.ndarray:
     return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, LANES * lanes_of(last) - last)])
 
 
+def without_rounding(integrals: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    """Return integrals of modes k and l, shape (n, n, 3), with zeros where nothing but rounding is.
+
+    ``mass`` is the matrix of their masses, shape (n, n), kg; their bound is the root of M_kk M_ll.
+    """
+    size = np.sqrt(np.maximum(np.diag(mass), 0.0))
+    return np.where(np.abs(integrals) > ROUNDING * np.outer(size, size)[..., None], integrals, 0.0)
+
+
 def in_lanes(rows: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Return where modes are gathered; for each lanes how many modes l add to them, these modes, and what they add.
 
-    ``rows`` has shape (n, PRESENT, n): l, number a mode, the other mode. Nothing is gathered if neighbours are as good.
+    ``rows`` has shape (n, PRESENT, n): l, number a mode, the other mode.
     """
-    plain = _listed(rows)
     order = _alike(np.moveaxis(rows.astype(bool), 2, 0).reshape(rows.shape[2], -1))
-    gathered = _listed(rows[:, :, order])
-    if len(gathered[1]) + MOVED * rows[0].size > len(plain[1]):
-        return np.empty(0), plain
-    return np.argsort(order), gathered
+    return np.argsort(order), _listed(rows[:, :, order])
 
 
 def _listed(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -49,7 +55,8 @@ def _listed(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _alike(taken: np.ndarray) -> np.ndarray:
     """Return an order in which modes stand beside those with which they share most of what they take part in."""
-    shared = taken.astype(float) @ taken.T
+    parts = taken.astype(float)
+    shared = parts @ parts.T
     sizes = np.diag(shared)
     shared /= np.maximum(sizes[:, None] + sizes - shared, 1.0)
     order = [int(np.argmax(sizes))]
