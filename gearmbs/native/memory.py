@@ -39,8 +39,8 @@ REFERENCED = 1
 
 PER_COLUMN = ("a_ptr", "u_ptr", "l_ptr", "pivot_ptr", "op_ptr", "div_ptr")
 OF_TAIL = (
-    "tail_at", "tail_src", "tail_scale", "block_col", "lane_ptr", "act_ptr", "act_to", "act_by", "act_u", "part_ptr",
-    "part_at", "part_col",
+    "tail_at", "tail_src", "tail_scale", "block_col", "lane_ptr", "act_ptr", "act_to", "act_by", "act_u", "last_ptr",
+    "last_to", "part_ptr", "part_at", "part_col", "above_ptr", "above_col", "above_at",
 )  # fmt: skip
 """Arrays of a plan that no plan made without Python has."""
 OF_MATRIX = ("a_pos", "a_src", "a_scale", "a_to", "left_src", "left_limit", "limit")

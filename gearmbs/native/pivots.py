@@ -36,12 +36,12 @@ RETRY = 1
 
 (
     A_PTR, A_POS, A_SRC, A_SCALE, TAIL_AT, TAIL_SRC, TAIL_SCALE, U_PTR, U_POS, L_PTR, L_POS, U_COL, L_COL, BLOCK_COL,
-    LANE_PTR, ACT_PTR, ACT_TO, ACT_BY, ACT_U, PART_PTR, PART_AT, PART_COL, L_TO, L_BY, U_TO, U_BY, A_TO, PIVOT_PTR,
-    PIVOT_ORDER, OP_PTR, OP_TO, OP_L, OP_U, DIV_PTR, DIV_TO, DIV_BY, NODE_END, ROW_FROM, COL_TO, ROW_SCALE, COL_SCALE,
-    KEPT, LEFT_SRC, LEFT_LIMIT, LIMIT,
+    LANE_PTR, ACT_PTR, ACT_TO, ACT_BY, ACT_U, LAST_PTR, LAST_TO, PART_PTR, PART_AT, PART_COL, ABOVE_PTR, ABOVE_COL,
+    ABOVE_AT, L_TO, L_BY, U_TO, U_BY, A_TO, PIVOT_PTR, PIVOT_ORDER, OP_PTR, OP_TO, OP_L, OP_U, DIV_PTR, DIV_TO, DIV_BY,
+    NODE_END, ROW_FROM, COL_TO, ROW_SCALE, COL_SCALE, KEPT, LEFT_SRC, LEFT_LIMIT, LIMIT,
 ) = range(len(LUPlan.array_members))  # fmt: skip
 """Arrays of a plan in their order; each has two words, address and length."""
-LU, _, X, W, BLOCKS, LOWER, REST = range(len(LUFactors.array_members))
+LU, _, X, W, BLOCKS, ABOVE, LOWER, REST = range(len(LUFactors.array_members))
 """The same of factors."""
 
 
@@ -211,11 +211,12 @@ def write_plan(d, room, columns, rows_left, vals, drop, leaves, negligible):
     # no pivots as a full block
     for k in (TAIL_AT, TAIL_SRC, TAIL_SCALE, BLOCK_COL, LANE_PTR, ACT_PTR, ACT_TO, ACT_BY, ACT_U):
         room.words[2 * k + 1] = 0
-    for k in (PART_PTR, PART_AT, PART_COL):
+    for k in (LAST_PTR, LAST_TO, PART_PTR, PART_AT, PART_COL, ABOVE_PTR, ABOVE_COL, ABOVE_AT):
         room.words[2 * k + 1] = 0
     room.head[0], room.head[1] = n, 0
     room.factor_words[2 * LU + 1], room.factor_words[2 * X + 1] = size, n
-    room.factor_words[2 * BLOCKS + 1], room.factor_words[2 * REST + 1] = 0, 0
+    for member in (BLOCKS, ABOVE, REST):
+        room.factor_words[2 * member + 1] = 0
     room.factor_words[2 * LOWER + 1] = LANES
     room.lu[:] = 0.0
     room.x[:] = 0.0

@@ -368,10 +368,17 @@ def operations_on_blocks(
     blocks : FrontBlocks
     """
     act_ptr, act_to, act_by, act_u = _actions(tail, step, u_ptr, u_pos, u_at, blocks.ptr, blocks.at, blocks.lane)
+    # the last step's wait for nothing: those on a block stand together
+    first = act_ptr[-2]
+    together = first + np.argsort(act_to[first:], kind="stable")
+    for items in (act_to, act_by, act_u):
+        items[first:] = items[together]
+    last_to, last_ptr = np.unique(act_to[first:], return_index=True)
     columns = np.repeat(np.arange(len(step)), np.diff(blocks.ptr))
     order = np.argsort(step[columns], kind="stable")
     return {
         "act_ptr": act_ptr, "act_to": act_to, "act_by": act_by, "act_u": act_u,
+        "last_to": last_to, "last_ptr": first + np.append(last_ptr, len(act_to) - first),
         "part_ptr": np.searchsorted(step[columns][order], np.arange(len(act_ptr))),
         "part_at": blocks.at[order].astype(np.uint32), "part_col": columns[order].astype(np.uint32),
     }  # fmt: skip
@@ -435,6 +442,39 @@ def divide_blocks(plan, blocks, pivot_inv, step, growth):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def less_blocks(kept, q, last, blocks, by, numbers, of):
+    """Return lanes less the products of blocks and numbers, in two sums, or each would wait for the one before.
+
+    Parameters
+    ----------
+    kept : lanes
+    q, last : int
+        The first product and the one behind the last.
+    blocks, by : ndarray
+        Blocks, and for each product which of them.
+    numbers, of : ndarray
+        Numbers, and for each product which of them.
+    """
+    odd = all_lanes(0.0)
+    while q + np.uint64(2) <= last:
+        kept = kept - lanes_at(blocks, np.int64(by[q])) * numbers[of[q]]
+        odd = odd + lanes_at(blocks, np.int64(by[q + np.uint64(1)])) * numbers[of[q + np.uint64(1)]]
+        q += np.uint64(2)
+    if q < last:
+        kept = kept - lanes_at(blocks, np.int64(by[q])) * numbers[of[q]]
+    return kept - odd
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
+def act_at_last(plan, blocks, lu):
+    """Do what `act_on_blocks` does in the last step, one changed block after the other."""
+    to, ptr = plan.last_to, plan.last_ptr
+    for g in range(to.shape[0]):
+        b, q, last = np.int64(to[g]), np.uint64(ptr[g]), np.uint64(ptr[g + 1])
+        put_lanes(blocks, b, less_blocks(lanes_at(blocks, b), q, last, blocks, plan.act_by, lu, plan.act_u))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def tail_in(plan, blocks):
     """Return the tail's own block."""
     first = LANES * plan.block_col.shape[0]
@@ -442,10 +482,10 @@ def tail_in(plan, blocks):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def factor_behind(plan, factors, step, growth):
+def factor_behind(plan, factors, growth):
     """Factor the tail after all pivots before it, in the last step; return the largest multiplier of all blocks."""
     blocks, rest = factors.blocks, factors.rest
-    act_on_blocks(plan, blocks, factors.lu, step)
+    act_at_last(plan, blocks, factors.lu)
     top = bits_of(largest_in(rest, 0, growth[0] + growth[1]))
     grown = factor_tail(plan.tail, factors.lower, tail_in(plan, blocks), factors.pivot_inv)
     return double_of(max(top, bits_of(grown)))
@@ -489,3 +529,53 @@ def open_tail(tail, lane_ptr, block_col, blocks, x, rest):
         if q < last:
             even = even - lanes_at(blocks, np.int64(q)) * x[block_col[q]]
         put_lanes(rest, b, even - odd)
+
+
+# Blocks of eight rows of U before the tail, in the tail's columns: what the tail's unknowns give to those before them.
+
+
+def blocks_above(tail: int, n: int, u_to: np.ndarray, u_by: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the fields ``above_ptr``, ``above_col`` and ``above_at`` of a `gearmbs.dae.linalg.lu_plan.LUPlan`.
+
+    Parameters
+    ----------
+    tail, n : int
+        First pivot of the tail; pivots.
+    u_to, u_by : ndarray
+        Rows and columns of the entries of U, see there.
+    """
+    inside = u_by >= tail
+    row, column = u_to[inside].astype(np.int64), u_by[inside].astype(np.int64)
+    keys, block = np.unique(row // LANES * n + column, return_inverse=True)
+    return {
+        "above_ptr": np.searchsorted(keys // n, np.arange(padded(tail) // LANES + 1)),
+        "above_col": (keys % n).astype(np.uint32),
+        "above_at": (LANES * block + row % LANES).astype(np.uint32),
+    }
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def fill_above(plan, factors):
+    """Write the entries of U in the tail's columns, as the levels have left them, to their blocks."""
+    above, at, lu = factors.above, plan.above_at, factors.lu
+    first = np.uint64(plan.l_to.shape[0])
+    for b in range(above.shape[0] // LANES):
+        put_lanes(above, b, all_lanes(0.0))
+    for p in range(np.uint64(at.shape[0])):
+        above[at[p]] = lu[first + p]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
+def take_above(plan, factors):
+    """Take from ``factors.x`` before the tail what the tail's unknowns, which stand there, give."""
+    x, above, column, ptr = factors.x, factors.above, plan.above_col, plan.above_ptr
+    for g in range(ptr.shape[0] - 1):
+        q, last = np.uint64(ptr[g]), np.uint64(ptr[g + 1])
+        even, odd = lanes_at(x, g), all_lanes(0.0)
+        while q + np.uint64(2) <= last:
+            even = even - lanes_at(above, np.int64(q)) * x[column[q]]
+            odd = odd + lanes_at(above, np.int64(q) + 1) * x[column[q + np.uint64(1)]]
+            q += np.uint64(2)
+        if q < last:
+            even = even - lanes_at(above, np.int64(q)) * x[column[q]]
+        put_lanes(x, g, even - odd)

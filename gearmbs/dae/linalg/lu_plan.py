@@ -9,6 +9,7 @@ import numpy as np
 from numba import boolean, float64, int64, types, uint32
 
 from gearmbs.dae.linalg.dense_tail import (
+    blocks_above,
     entries_in_blocks,
     front_blocks,
     operations_on_blocks,
@@ -43,10 +44,10 @@ modes each a tenth is, and 67 us by levels compare with 240; of ten blocks of 40
 
 NO_TAIL = {
     **dict.fromkeys(
-        ("tail_at", "tail_src", "block_col", "act_to", "act_by", "act_u", "part_at", "part_col"),
+        "tail_at tail_src block_col act_to act_by act_u last_to part_at part_col above_col above_at".split(),
         np.zeros(0, dtype=np.uint32),
     ),
-    **dict.fromkeys(("lane_ptr", "act_ptr", "part_ptr"), np.zeros(0, dtype=np.int64)),
+    **dict.fromkeys(("lane_ptr", "act_ptr", "last_ptr", "part_ptr", "above_ptr"), np.zeros(0, dtype=np.int64)),
     "tail_scale": np.zeros(0),
 }
 """Fields of a plan without a dense tail."""
@@ -76,8 +77,13 @@ class LUPlan(Struct):
     act_ptr, act_to, act_by, act_u : ndarray
         For each step, a level of columns or one, its operations on blocks: the block that is changed, and the block
         and the entry of U, among the numbers of the factors, whose product is taken off.
+    last_to, last_ptr : ndarray
+        The blocks that the last step changes, and where the operations on each begin and end; they stand together.
     part_ptr, part_at, part_col : ndarray
         For each step the blocks that become part of L, and their columns.
+    above_ptr, above_col, above_at : ndarray
+        Where the blocks of each eight rows of U before the tail begin, in the tail's columns; the columns of the
+        blocks; and where the ``u_tail`` entries of U in these columns stand in them.
     l_to, l_by, u_to, u_by : ndarray
         Places that the entries of L and U change in a substitution, and by which, in the order in which the entries
         stand among the numbers of the factors: L, then U, then the pivots. It is that of a substitution, with the
@@ -130,9 +136,14 @@ class LUPlan(Struct):
     act_to: IndexVector
     act_by: IndexVector
     act_u: IndexVector
+    last_ptr: IntVector
+    last_to: IndexVector
     part_ptr: IntVector
     part_at: IndexVector
     part_col: IndexVector
+    above_ptr: IntVector
+    above_col: IndexVector
+    above_at: IndexVector
     l_to: IndexVector
     l_by: IndexVector
     u_to: IndexVector
@@ -230,6 +241,8 @@ def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     else:
         f |= operations_on_blocks(tail, step, f["u_ptr"], f["u_pos"], u_at, blocks)
     none, u_tail = np.empty(0), np.count_nonzero(f["u_col"] >= tail)
+    if blocks is not None:
+        f |= blocks_above(tail, n, order["u_to"], order["u_by"])
     of_a = _rows_and_columns(f["a_src"], taken, indptr, indices)
     of_tail = _rows_and_columns(f["tail_src"], taken, indptr, indices)
     plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, u_tail=u_tail, **f, **order)

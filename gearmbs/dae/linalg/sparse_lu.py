@@ -17,11 +17,13 @@ from gearmbs.dae.linalg.dense_tail import (
     act_on_blocks,
     divide_blocks,
     factor_behind,
+    fill_above,
     fill_blocks,
     open_tail,
     padded,
     solve_tail,
     tail_in,
+    take_above,
 )
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.schedule import has_nodes, through_node
@@ -109,7 +111,7 @@ def factor_by_columns(plan, factors, vals):
             act_on_blocks(plan, blocks, lu, k)
             grown = divide_blocks(plan, blocks, pivot_inv, k, grown)
     if tail < n:
-        top = max(top, bits_of(factor_behind(plan, factors, tail, grown)))
+        top = max(top, bits_of(factor_behind(plan, factors, grown)))
     return double_of(top)
 
 
@@ -177,6 +179,8 @@ class LUFactors(Struct):
         Scratch, a number each row; ``x`` is filled up to whole lanes of the tail's rows.
     blocks : ndarray
         L of the pivots before the dense tail in its rows, block by block; then U of the tail.
+    above : ndarray
+        U of the pivots before the dense tail in its columns, block by block.
     lower, rest : ndarray
         L of the dense tail, and its part of a right-hand side.
     """
@@ -186,6 +190,7 @@ class LUFactors(Struct):
     x: Vector
     w: Vector
     blocks: Vector
+    above: Vector
     lower: Vector
     rest: Vector
 
@@ -194,7 +199,7 @@ FACTORS_TYPE = LUFactors.numba_type
 
 
 @lru_cache(maxsize=KEPT_LAYOUTS)
-def _layout(n: int, tail: int, entries: int, blocks: int) -> BlockLayout[LUFactors]:
+def _layout(n: int, tail: int, entries: int, blocks: int, above: int) -> BlockLayout[LUFactors]:
     """Return where the numbers stand: arrays, and of ``x`` the rows of the tail, where the processor reads lanes."""
     rows = padded(n - tail)
     sizes = {
@@ -203,6 +208,7 @@ def _layout(n: int, tail: int, entries: int, blocks: int) -> BlockLayout[LUFacto
         "x": tail + rows,
         "w": n,
         "blocks": LANES * blocks + rows * (n - tail),
+        "above": LANES * above,
         "lower": rows * (n - tail) + LANES,
         "rest": rows,
     }
@@ -211,7 +217,8 @@ def _layout(n: int, tail: int, entries: int, blocks: int) -> BlockLayout[LUFacto
 
 def new_factors(plan: LUPlan) -> LUFactors:
     """Return empty factors for a plan."""
-    return _layout(len(plan.row_from), plan.tail, len(plan.l_pos) + len(plan.u_pos), len(plan.block_col)).new()
+    entries = len(plan.l_pos) + len(plan.u_pos)
+    return _layout(len(plan.row_from), plan.tail, entries, len(plan.block_col), len(plan.above_col)).new()
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -250,7 +257,8 @@ def _factor_by_levels(plan, factors, vals):
     for k in range(np.uint64(plan.pivot_ptr[steps]), np.uint64(n)):
         pivot_inv[pivot_order[k]] = 0.0
     if tail < n:
-        top = max(top, bits_of(factor_behind(plan, factors, steps - 1, grown)))
+        fill_above(plan, factors)
+        top = max(top, bits_of(factor_behind(plan, factors, grown)))
     return double_of(top)
 
 
@@ -334,8 +342,8 @@ def solve(plan, factors, b, out):
         first, known = np.uint64(plan.u_tail), np.uint64(plan.tail)
         for k in range(known, np.uint64(n)):
             x[k] *= pivot_inv[k]
-        for p in range(first):
-            x[u_to[p]] -= lu[upper + p] * x[u_by[p]]
+        if plan.tail < n:
+            take_above(plan, factors)
         for p in range(first, np.uint64(u_to.shape[0])):
             k = u_by[p]
             x[u_to[p]] -= lu[upper + p] * (x[k] * pivot_inv[k])
