@@ -59,6 +59,9 @@ NEEDED = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt
 OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
 """Settings of numba's that change its machine code."""
 
+DISPATCHER: Any = dispatcher._DispatcherBase
+"""Kernels and functions of `numba.njit`: the class below the abstract one, whose test asks each object for its own."""
+
 _parts: dict[str, Any] = {}
 
 
@@ -138,7 +141,7 @@ def identity(function: Any) -> str:
 
 
 def _described(function: Any) -> str:
-    plain = function.py_func if isinstance(function, dispatcher.Dispatcher) else function
+    plain = function.py_func if isinstance(function, DISPATCHER) else function
     names: list[str] = []
     code = _code(plain.__code__, plain.__doc__, names)
     found = []
@@ -147,7 +150,7 @@ def _described(function: Any) -> str:
             found.append((name, _token(plain.__globals__[name], names)))
     cells = [_token(cell.cell_contents, names) for cell in plain.__closure__ or ()]
     options: tuple = ()
-    if isinstance(function, dispatcher.Dispatcher):
+    if isinstance(function, DISPATCHER):
         options = (
             sorted((k, repr(v)) for k, v in function.targetoptions.items()),
             _declared(function),
@@ -192,8 +195,8 @@ def _token(value: Any, names: list[str]) -> str:
         return f"{type(value).__qualname__} [{', '.join(_token(v, names) for v in value)}]"
     if isinstance(value, frozenset):
         return f"frozenset {sorted(_token(v, names) for v in value)}"
-    if isinstance(value, (dispatcher.Dispatcher, python.FunctionType)):
-        plain = value.py_func if isinstance(value, dispatcher.Dispatcher) else value
+    if isinstance(value, (DISPATCHER, python.FunctionType)):
+        plain = value.py_func if isinstance(value, DISPATCHER) else value
         if not _inside(plain.__module__):
             return f"{plain.__module__}.{plain.__qualname__}"
         if getattr(value, "late", False):
@@ -220,6 +223,7 @@ def _token(value: Any, names: list[str]) -> str:
     return f"{home}.{name} {_source(home)}"
 
 
+@functools.cache
 def _inside(module: str | None) -> bool:
     """Return whether a module is code of one's own, and not of an installed library's."""
     top = (module or "").partition(".")[0]

@@ -6,6 +6,7 @@ from its own code and all parts below it, optimised as a whole, and becomes the 
 
 from __future__ import annotations
 
+import functools
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba.core import compiler, environment
 from numba.core.codegen import JITCodeLibrary
+from numba.core.runtime import _nrt_python
 
 from gearmbs.kernels import cache
 
@@ -206,12 +208,10 @@ class EntryLibrary(_Linked, _Ready):
     @staticmethod
     def rebuild(target: Any, package: str, file: str, payload: tuple) -> Any:
         """Return a compile result from what was kept of it; only machine code is loaded."""
-        from numba.core.runtime import rtsys
-
         code, fndesc, own, signature, reload_init, environments, defined = payload
         for function in reload_init:
             function()
-        rtsys.initialize(target)
+        _name_helpers()
         codegen = target.codegen()
         library = _Ready(codegen, fndesc.qualname)
         library.enable_object_caching()
@@ -240,6 +240,16 @@ class EntryLibrary(_Linked, _Ready):
             reload_init=reload_init,
             referenced_envs=tuple(environments),
         )
+
+
+@functools.cache
+def _name_helpers() -> None:
+    """Let machine code find what numba's runtime has in C; its own copies of the rest are linked into each entry.
+
+    ``rtsys.initialize``, which numba calls itself before it compiles anything, also compiles that rest.
+    """
+    for name, where in _nrt_python.c_helpers.items():
+        llvm.add_symbol(name if name.startswith("_") else f"NRT_{name}", where)
 
 
 def _below(parts: dict[str, PartLibrary], seen: dict[str, PartLibrary] | None = None) -> list[PartLibrary]:
