@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -63,12 +64,24 @@ def test_first_and_second_derivatives(name):
         assert kernel(*place) == pytest.approx(right, rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["tan", "tanh", "arctan", "exp", "log"])
+@pytest.mark.parametrize("name", "tan tanh arctan exp log arcsin arccos sinh cosh".split())
 def test_functions_by_complex_steps(name):
     (x,) = inputs("x")
-    kernel = compiled(Function("law", "x", "", slopes(getattr(np, name)(x * x), [x])))
     law = getattr(np, name)
-    assert kernel(0.7) == pytest.approx(law((0.7 + 1e-30j) ** 2).imag / 1e-30, rel=1e-13)
+    kernel = compiled(Function("law", "x", "", [law(x * x), *slopes(law(x * x), [x])]))
+    assert kernel(0.7) == pytest.approx((law(0.49), law((0.7 + 1e-30j) ** 2).imag / 1e-30), rel=1e-13)
+
+
+def test_powers_of_numbers_and_lengths_of_two():
+    (x,) = inputs("x")
+    kernel = compiled(Function("law", "x", "", slopes(2.0**x + np.hypot(x, 3.0), [x])))
+    assert kernel(0.7) == pytest.approx(np.log(2.0) * 2.0**0.7 + 0.7 / np.hypot(0.7, 3.0), rel=1e-14)
+
+
+@pytest.mark.parametrize("function", [lambda x: math.sqrt(x[0]), lambda x: float(x[1])])
+def test_what_takes_floats_alone_is_refused(function):
+    with pytest.raises(TypeError, match=says("float", "math", "numpy")):
+        function(np.array(inputs("x y z")))
 
 
 def test_choices_are_differentiated_on_the_side_that_is_chosen():
@@ -93,6 +106,8 @@ def test_arrays_of_numbers_have_the_products_of_numpy():
     two = a[0] * b
     kernel = compiled(Function("law", "a_x, a_y, a_z, b_x, b_y, b_z", "", [a @ b, *np.cross(a, b), *(two + a - a)]))
     numbers = np.arange(1.0, 7.0)
+    length = compiled(Function("law", "a_x, a_y, a_z", "", [np.linalg.norm(a)]))
+    assert length(1.0, 2.0, 2.0) == 3.0
     right = [numbers[:3] @ numbers[3:], *np.cross(numbers[:3], numbers[3:]), *numbers[3:]]
     assert kernel(*numbers) == pytest.approx(right)
 

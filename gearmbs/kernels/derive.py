@@ -29,6 +29,7 @@ import numpy as np
 WIDTH = 110
 """Characters of an expression beyond which a part of it gets a line of its own."""
 BRANCH = "a branch cannot be traced; use gm.choose(a, b, x, y), x where a > b and else y, np.maximum or np.minimum"
+FLOAT = "it is no float, but written down; for functions of math write those of numpy"
 _nodes: dict[tuple, Value] = {}
 _slopes: dict[tuple[Value, Value], Value] = {}
 
@@ -148,6 +149,27 @@ class Value:
     def sqrt(self) -> Value:
         squares = _squares(self)
         return _node("norm", *squares) if squares else _node("sqrt", self)
+
+    def __rpow__(self, base: Any) -> Value:
+        return value_of(base) ** self
+
+    def __float__(self) -> float:
+        raise TypeError(FLOAT)
+
+    def hypot(self, other: Any) -> Value:
+        return (self * self + value_of(other) * other).sqrt()
+
+    def arcsin(self) -> Value:
+        return self.arctan2((1.0 - self * self).sqrt())
+
+    def arccos(self) -> Value:
+        return (1.0 - self * self).sqrt().arctan2(self)
+
+    def sinh(self) -> Value:
+        return 0.5 * (self.exp() - (-self).exp())
+
+    def cosh(self) -> Value:
+        return 0.5 * (self.exp() + (-self).exp())
 
     def __abs__(self) -> Value:
         return choose(self, 0.0, self, -self)

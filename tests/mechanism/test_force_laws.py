@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -183,6 +186,24 @@ def test_three_markers_and_what_a_law_brings_along_are_refused():
     kernel = m.force("kernel", lambda t, f, z, p, w, r, d: None, markers[0], markers[1])
     with pytest.raises(ModelError, match=says("kernel", "force_law")):
         kernel.by_parameter("strength", np.zeros((2, 18)), np.zeros(0))
+
+
+def test_names_of_a_law_are_its_own_and_a_mechanism_with_one_travels():
+    """Parameters that have the names of what kernels take, and copies in other processes."""
+
+    def law(i, frames, wrench=2.0):
+        return Wrench(energy=0.5 * frames * wrench * (i.origin @ i.origin))
+
+    m = Mechanism("one")
+    body = m.body("b", mass=1.0, inertia=(1, 1, 1), position=(1, 0, 0))
+    made = m.force("pull", force_law(law), body.marker(), parameters={"frames": 3.0})
+    place = np.zeros((1, 18))
+    place[0, 0] = 0.5
+    for element in (made, copy.deepcopy(m).elements["pull"], pickle.loads(pickle.dumps(m)).elements["pull"]):
+        wrench = np.zeros((1, 6))
+        element.function(0.0, place, np.zeros(0), element.parameters, wrench, np.zeros(0), np.zeros(2))
+        assert wrench[0] == pytest.approx([-3.0, 0, 0, 0, 0, 0], rel=1e-14)
+        assert element.by_parameter("wrench", place)[0] == pytest.approx(-1.5)
 
 
 def test_numbers_may_be_chosen_without_tracing():

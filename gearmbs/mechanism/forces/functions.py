@@ -118,6 +118,18 @@ class FunctionForce(ForceElement):
             scratch=FRAME_COLUMNS * n + 2 * len(self.own_states) + len(self.told) + 6 * w,
         )
 
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(self.__dict__)
+        if self.law is not None:
+            state |= {"function": None, "derivatives": None}
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if self.law is not None:
+            made = self.law.compiled(_compile_both)
+            self.__dict__["function"], self.__dict__["derivatives"] = made
+
     def by_parameter(
         self, name: str, frames: np.ndarray, states: np.ndarray | None = None, inputs: np.ndarray | None = None,
         t: float = 0.0,

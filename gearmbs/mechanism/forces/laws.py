@@ -95,8 +95,9 @@ def force_law(function: Callable[..., Wrench]) -> ForceLaw:
     function : callable
         ``function(i, j, ...)`` takes the markers that it acts between, or one of them, which is pushed from the ground;
         then by name ``t``, its states and its parameters, defaults allowed. Markers have ``origin``, ``axes``,
-        ``velocity`` and ``angular_velocity``. It returns a :class:`Wrench`. It is written with arithmetic, functions of
-        numpy and `choose` for branches.
+        ``velocity`` and ``angular_velocity``. It returns a :class:`Wrench`. It is written with arithmetic, powers,
+        products of arrays, functions of numpy (roots, exponential, trigonometric and hyperbolic ones and their
+        inverses, ``maximum``, ``minimum``, ``abs``, ``hypot``, ``cross``, ``linalg.norm``) and `choose` for branches.
 
     Returns
     -------
@@ -134,13 +135,24 @@ class Derived:
         are the wrench and the rates, columns variations and states, or parameters.
     parameters : mapping of str to float
         In the order of the columns.
+    name, texts : str, tuple of str
+        Of the law, and of the three functions.
     """
 
     values: Callable
     derivatives: Callable
     by_parameters: Callable
     parameters: Mapping[str, float]
+    name: str
+    texts: tuple[str, ...] = field(repr=False)
     _compiled: list = field(default_factory=list, repr=False)
+
+    def __reduce__(self) -> tuple:
+        # functions that were made by a program travel as their texts
+        return derived_of, (self.name, self.texts, dict(self.parameters))
+
+    def __deepcopy__(self, memo: dict) -> Derived:
+        return self
 
     def compiled(self, compiler: Callable[[str, Callable, Callable], tuple[Any, Any]]) -> tuple[Any, Any]:
         """Return values and derivatives as a compiler makes them, once for all elements of a law."""
@@ -206,8 +218,9 @@ def _parameters_of(label: str, law: ForceLaw, markers: int, given: Any, states: 
 def _traced(label: str, law: ForceLaw, markers: int, numbers: list[str], states: list[str], algebraic: int) -> Derived:
     frames = [Frame("frames", f"m{k}", f"{k}, ") for k in range(markers)]
     seen = [Seen(np.array(f.origin), np.array(f.axes).T, np.array(f.v), np.array(f.w)) for f in frames]
-    own = dict(zip(states, inputs(" ".join(states), "states"))) if states else {}
-    values = dict(zip(numbers, inputs(" ".join(numbers), "parameters"))) if numbers else {}
+    # under names of their own: the kernels' arguments have some, too
+    own = dict(zip(states, inputs(" ".join(f"z_{name}" for name in states), "states")))
+    values = dict(zip(numbers, inputs(" ".join(f"p_{name}" for name in numbers), "parameters")))
     (t,) = inputs("t")
     by_name = {**own, **values, "t": t}
     taken = list(inspect.signature(law.function).parameters)[markers:]
@@ -242,8 +255,7 @@ def _traced(label: str, law: ForceLaw, markers: int, numbers: list[str], states:
         Function("by_parameters", f"{head}, out", "Write its derivatives by the parameters.",
                  sets=_matrix("out", rows, list(values.values()))),
     ]  # fmt: skip
-    first, second, third = (_function(law.__name__, one) for one in made)
-    return Derived(first, second, third, {})
+    return derived_of(law.__name__, tuple(one.undecorated() for one in made), {})
 
 
 def _wrench(label: str, load: Wrench, energy: Value, frames: list[Frame]) -> list[Value]:
@@ -281,13 +293,14 @@ def _matrix(array: str, rows: Sequence[Value], by: Sequence[Value]) -> dict[str,
     return {place: slope for place, slope in slopes.items() if slope is not ZERO}
 
 
-def _function(name: str, made: Function) -> Callable:
-    """Return a written kernel as a function, whose text is found by its file's name."""
-    text, file = made.undecorated(), f"<law {name} {next(_numbers)}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+def derived_of(name: str, texts: tuple[str, ...], parameters: Mapping[str, float]) -> Derived:
+    """Return the kernels of a law from their texts, which are found by the names of their files."""
     space: dict[str, Any] = {"np": np}
-    exec(compile(text, file, "exec"), space)
-    return space[made.name]
+    for text in texts:
+        file = f"<law {name} {next(_numbers)}>"
+        linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+        exec(compile(text, file, "exec"), space)
+    return Derived(space["values"], space["derivatives"], space["by_parameters"], parameters, name, texts)
 
 
 def straightened(function: Callable) -> Callable:
