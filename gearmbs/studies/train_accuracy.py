@@ -285,9 +285,12 @@ def errors_of_loads(found: Lines, twin: Lines, share: float) -> np.ndarray:
 
 
 def _share(fine: Precise, coarse: Precise) -> float:
-    """Return the part of the difference of two runs that the error of the finer one is at most."""
+    """Return the part of the difference of two runs that the error of the finer one is at most.
+
+    Where they differ in their slices, too, it may be of both: `SHARE` for the steps, and for the slices as of a case.
+    """
     ratios = [coarse.slices[name] / n for name, n in fine.slices.items()]
-    return max([SHARE, *(r**2 / (1.0 - r**2) for r in ratios if r < 1.0)])
+    return SHARE + max((r**2 / (1.0 - r**2) for r in ratios if r < 1.0), default=0.0)
 
 
 def _part(error: np.ndarray, largest: np.ndarray) -> float:
