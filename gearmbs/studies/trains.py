@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -180,37 +181,35 @@ def _accurate(
         duration = 0.5 * run.duration if precise.half else run.duration
         settings = replace(run, tolerance=precise.tolerance, duration=duration)
         known, solution = _simulated(one, settings, mechanism, progress)
-        record = evaluated(one, settings, known, solution)
+        record = _even_record(one, settings, known) if precise.half else evaluated(one, settings, known, solution)
         # the drivetrain as it was asked for: slices are those of its accuracy, and told beside it
         record.attrs["train_json"] = _described(train)
-        levels, half = record["mesh_rms"].values, 0.5 * run.duration
-        parts = [levels]
-        if not precise.half:
-            halves = (replace(settings, settling=run.settling + k * half, duration=half) for k in range(2))
-            parts = [_levels(one, part, known) for part in halves]
+        count = record.sizes["time"]
+        ends = [0, count] if precise.half else [0, count // 2, count]
+        halves = np.stack([_levels(one, settings, known, record, *pair) for pair in pairwise(ends)])
+        loads = np.stack([equivalent_loads(one, record, *pair) for pair in pairwise(ends)])
+        levels = halves[0] if precise.half else record["mesh_rms"].values
         start = one.run_up + run.settling
         within, whole = (
             time_apart(known.t[inside], known.contact[inside, :, 0])
-            for stop in (half, duration)
+            for stop in (0.5 * run.duration, duration)
             for inside in [slice(*np.searchsorted(known.t, (start, start + stop)))]
         )
-        middle = record.sizes["time"] if precise.half else record.sizes["time"] // 2
-        loads = [equivalent_loads(one, record, 0, middle)]
-        loads += [] if precise.half else [equivalent_loads(one, record, middle)]
-        return Lines(record, signal_names(one), levels, np.stack(parts), within, whole, np.stack(loads))
+        return Lines(record, signal_names(one), levels, halves, within, whole, loads)
 
     names = len(train.meshings) + 3 * (len(train.bearings) + len(train.pins))
     groups = np.concatenate([np.zeros(names, dtype=int), 1 + np.arange(len(train.sensors))])
     return accurate_lines(lines, Precise(JOINED, slices), wanted, groups, "mesh_rms", title)
 
 
-def _levels(train: Drivetrain, run: RunSettings, known: TrainColumns) -> np.ndarray:
-    """Return the mesh harmonics of a part of what was measured, (signals, meshes, harmonics)."""
-    out = _even_record(train, run, known)
-    start = train.run_up + run.settling
-    return harmonic_levels(
-        train, run, out, run.output_rate(train), known, start, start + run.duration, held_speeds(train, out)
-    ).values
+def _levels(
+    train: Drivetrain, run: RunSettings, known: TrainColumns, record: xr.Dataset, first: int, stop: int
+) -> np.ndarray:
+    """Return the mesh harmonics of some samples of a record, (signals, meshes, harmonics)."""
+    part, rate = record.isel(time=slice(first, stop)), run.output_rate(train)
+    start = float(part["time"][0])
+    end = start + (stop - first) / rate
+    return harmonic_levels(train, run, part, rate, known, start, end, held_speeds(train, part)).values
 
 
 def _simulated(
