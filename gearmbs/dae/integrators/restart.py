@@ -188,10 +188,12 @@ def take_block(functions, st, plan, factors):
         renew_weights(st, rows[0], h)
         if _settle_points(functions, st, plan, factors, h):
             error = _block_error(st, h)
-            if error <= BLOCK_ERROR:
+            if error <= BLOCK_ERROR and _unsettled_at_start(functions, st, plan, factors) <= BLOCK_ERROR:
                 _go_on(st, h)
                 return RUNNING
             st.h_block = h * max(BLOCK_SHRINK, (target(st, BLOCK_ORDER) / error) ** (1.0 / POINTS))
+            if error <= BLOCK_ERROR:
+                st.h_block = BLOCK_SHRINK * h
             spread = h
         else:
             st.h_block = BLOCK_SHRINK * h
@@ -270,6 +272,24 @@ def _settle_points(functions, st, plan, factors, h):
             return False
         before = change
     return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _unsettled_at_start(functions, st, plan, factors):
+    """Return by how much a step of a block would move what its polynomial leaves of the equations where it begins.
+
+    They hold at the points beyond. Between the start and the first of these they may have a kink, as where a contact
+    closes: the polynomial is then a solution of what lies behind the kink all the way, as smooth as any.
+    """
+    times, rows = times_from(st, 1), rows_from(st, 1)
+    bdf.step_coefficients(times[0], times, POINTS, st.value, st.slope)
+    bdf.predict(st.value, st.slope, POINTS + 1, rows, st.y, st.yp)
+    st.t_seen = times[0]
+    functions.residual(st.t_seen, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
+    solve(plan, factors, st.res, st.delta)
+    st.residuals += 1
+    st.solves += 1
+    return weighted_max(st.delta, st.w_error)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

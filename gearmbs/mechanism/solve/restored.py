@@ -36,12 +36,15 @@ class Mark(NamedTuple):
         Inputs whose lines end there.
     given : ndarray
         Places of numbers that have been set.
+    counted : dict
+        Turns counted up to what has been asked for, see `gearmbs.mechanism.solve.told`.
     """
 
     points: int
     point: tuple
     led: tuple[str, ...]
     given: np.ndarray
+    counted: dict[Any, tuple[tuple, Any]]
 
 
 class Restored(Told):
@@ -89,7 +92,7 @@ class Restored(Told):
         own, history = self.__dict__, run.history(self._equations, point)
         held: Any = history.numbers
         settings, given = own["_settings"], self._places_given()
-        held.mark = new_mark(Mark, (len(own["_points"]), point, tuple(settings.led), given))
+        held.mark = new_mark(Mark, (len(own["_points"]), point, tuple(settings.led), given, dict(own["_counted"])))
         integers, before = self._changed_integers(point[3]), own["_base"].rdata
         return State.held(self._of_model, point[0], held, history, integers, before, given)
 
@@ -165,6 +168,10 @@ class Restored(Told):
             first, origin = self._own_point(state), (self._problem, self._origin)
             kept = self._points[: first + 1] if first is not None else []
             self._begin_in(state)
+            if state.history is not None and state.is_own and state.history.equations == self._equations:
+                # turns that no point of the solution knows
+                mark: Mark | None = getattr(state.history.numbers, "mark", None)
+                self._counted = {} if mark is None else dict(mark.counted)
             if kept:
                 # what stood there up to the state, which a jump may follow
                 self._problem, self._origin = origin
@@ -239,8 +246,7 @@ class Restored(Told):
         settings.go_back(mark[2], t)
         own["_given"] = mark[3]
         own["_failed"] = own["_passed"] = own["_present"] = None
-        if own["_counted"]:
-            own["_counted"] = {}
+        own["_counted"] = dict(mark.counted)
         own["_next_look"] = t if own["_system"].has_dropped_rows else np.inf
         own["_since"] = own["t"] = t
         own["_at"] = t, place[0], place[1], run.table

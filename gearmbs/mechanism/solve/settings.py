@@ -28,6 +28,8 @@ class Change(NamedTuple):
     """Whether a rate jumps whose effect is not in proportion to it, or changes with the time."""
     bent: bool = False
     """Whether derivatives of the equations may change: elements, or expressions that more than one number stands in."""
+    leaps: bool = False
+    """Whether velocities jump: a rate that is prescribed does, or a position begins to change at another one."""
 
 
 class Settings:
@@ -190,7 +192,7 @@ class Settings:
     def take(self, t: float, end: float) -> Change | None:
         """Return what changes at ``t``, None for nothing; lines that begin there end at ``end``."""
         waiting, before, after = self.waiting, self.held, self.held
-        loads, jumps, leads, prescribes, unsure, bent = True, False, False, False, False, False
+        loads, jumps, leads, prescribes, unsure, bent, leaps = True, False, False, False, False, False, False
         ended = [name for name, last in self.led.items() if last <= t and name not in waiting] if self.led else ()
         for name in (*waiting, *ended):
             own = self._own[name]
@@ -205,6 +207,7 @@ class Settings:
                 own.write(after, t, now if hold else value, slope)
                 loads &= own.kind == INPUT or own.loads
                 prescribes |= bool(own.prescribes)
+                leaps |= any(jumped if order == 1 else turned and order == 0 for _, order in own.prescribes)
                 jumps, leads, unsure = jumps or jumped, leads or turned, unsure or (turned and name in self.bent)
                 bent |= name in self.bent
             self.led.pop(name, None)
@@ -213,4 +216,4 @@ class Settings:
         waiting.clear()
         if not (jumps or leads):
             return None
-        return Change(after, loads, jumps, leads, prescribes, unsure, bent or not loads)
+        return Change(after, loads, jumps, leads, prescribes, unsure, bent or not loads, leaps)

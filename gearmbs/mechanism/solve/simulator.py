@@ -312,7 +312,8 @@ class Simulator(Sampled, Restored, Guessed):
             warn_of_unmet(self._unmet)
             self._unmet = []
         settings = self._settings
-        if (settings.waiting or settings.led) and 0.0 < t - self.t < RESOLVED * self.t_end:
+        begins = settings.waiting or any(last <= self.t for last in settings.led.values())
+        if begins and 0.0 < t - self.t < RESOLVED * self.t_end:
             raise ModelError(
                 f"t = {t:.9g} s lies {t - self.t:.2g} s after the present time, at which something was set; up to "
                 f"t_end = {self.t_end:.6g} s times are told apart by {RESOLVED * self.t_end:.2g} s: go on by more"
@@ -520,7 +521,7 @@ class Simulator(Sampled, Restored, Guessed):
         before = run.event_values(own["_at"]) if own["_stops"] and own["t"] > own["_t_start"] else None
         if change.prescribes or change.unsure or not run.state.steps:
             self._start_with(change.values)
-            if change.prescribes:
+            if change.leaps:
                 self._jumped.append(own["t"])
         else:
             began = perf_counter()
@@ -584,14 +585,14 @@ class Simulator(Sampled, Restored, Guessed):
             # the first point is one with what is set before the start, whatever a state has begun
             y = settle_states(self._base.residual, point.t, run.problem.y0, run.problem.yp0, *tables)
             yp = run.problem.yp0
-        told = run.told
+        told, counted = run.told, self._counted
         self._begin(State.of(self._base, point.t, y, yp, tables), repair=True)
         self._settings.led = led
         if begun:
             self._problem, self._origin = first
             self._points = points
             self.__dict__["_at"] = point
-            self._run.told = told
+            self._run.told, self._counted = told, counted
 
     def __repr__(self) -> str:
         name = self._system.mechanism.name if self._system.mechanism is not None else "mechanism"

@@ -112,7 +112,7 @@ class Rows(NamedTuple):
     """Counted turns, and behind them what named numbers were."""
 
 
-Numbers = tuple[np.ndarray, bool, bool, bool, bool, bool, bool]
+Numbers = tuple[np.ndarray, bool, bool, bool, bool, bool, bool, bool]
 """What `HeldRun.change` takes."""
 
 
@@ -393,15 +393,15 @@ class HeldRun(Run):
             The time, and where the values there stand.
         cells : ndarray
             Places in the table of numbers.
-        change : (ndarray, bool, bool, bool, bool, bool, bool)
+        change : (ndarray, bool, bool, bool, bool, bool, bool, bool)
             What is to stand there; whether that only acts as loads do, which leave the matrix as it is; whether
             equations change at the time, and whether the change grows with the time; whether it prescribes a motion,
-            which is nothing here; whether it is not known what it would have done to the past; and whether the matrix
-            may change.
+            which is nothing here; whether it is not known what it would have done to the past; whether the matrix may
+            change; and whether velocities jump, which is nothing here.
         """
         st, kept = self.state, True
         t, rows, row, *_ = point
-        values, loads, jumps, leads, _, unsure, bent = change
+        values, loads, jumps, leads, _, unsure, bent, _ = change
         y, yp = rows.y[row], rows.yp[row]
         if self.last_records.changed_at == st.steps or (self._given is not None and self._given[0] == st.steps):
             last = self.last_step()

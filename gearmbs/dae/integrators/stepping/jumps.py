@@ -32,7 +32,7 @@ import numpy as np
 from numba import boolean, float64, int64, types
 
 from gearmbs.dae.integrators.corrector import renew_weights, weighted_max
-from gearmbs.dae.integrators.newton_matrix import RATE_OF_FRESH, evaluate_matrix, factor_matrix
+from gearmbs.dae.integrators.restart import start_afresh
 from gearmbs.dae.integrators.run_state import ANSWER, STATE_TYPE, copy, matrix_at, record_history, rows_from, times_from
 from gearmbs.dae.integrators.step import CLOSE
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
@@ -160,7 +160,9 @@ def pass_jump(bound, st, plan, factors, t, y, yp, cells, values, jumps, leads, f
         st.residuals += int(jumps) * (1 + int(leads)) + 2 * int(leads)
     if follows and leads and not jumps and place >= 0:
         st.turned, st.turn_moves, st.turn_reach, st.turns_trusted = place, moved / abs(change), reach, 0
-    _go_on(st, not landed or moved > DOUBTED)
+    _go_on(st, not (landed and moved <= DOUBTED))
+    if moved != moved:
+        start_afresh(st)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -385,8 +387,8 @@ def _change_beside(functions, st, t, yp, cells, values, now, out):
 def _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g):
     """Do what `_follow` does where the jump may depend on the unknowns, as that of a damping or within a dead zone.
 
-    Then the matrix A jumps, too, and along the old solution b_0 grows by a b_1. Both begin to tell with the square of
-    the time: where they do, the answer is found with the new matrix.
+    Then the matrix A jumps, too, and along the old solution b_0 grows by a b_1, a b_2 and so on. These begin to tell
+    with the square of the time: where they do, no answer to a jump makes the past that of the new equations.
 
     Parameters
     ----------
@@ -396,7 +398,7 @@ def _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g):
     Returns
     -------
     moves : float
-        As there, not finite where the new matrix needs other pivots: the past is left as it was then.
+        As there; not a number where the past is of no use: it is left as it was then.
     """
     n, gamma = st.y.shape[0], st.gamma_factored
     first, later, jump, at = g[TERMS], g[TERMS + 1], st.yp_between, st.y_pred
@@ -413,23 +415,9 @@ def _follow_bent(functions, st, plan, factors, t, yp, cells, values, d, g):
     solve(plan, factors, later, d)
     st.solves += 2
     far = 1.0 + gamma * (t - times_from(st, 0)[min(st.order, st.n_past - 1)])
-    moves = 0.0
-    if far * far * weighted_max(d, st.w_error) > PROBED * UNSEEN:
-        for i in range(n):
-            at[i] = st.y[i] + PROBED * yp[i] / gamma
-        _change_beside(functions, st, t + PROBED / gamma, yp, cells, values, jump, later)
-        for i in range(n):
-            later[i] *= gamma / PROBED
-        st.t_seen, st.gamma = t, gamma
-        evaluate_matrix(functions, st)
-        if not factor_matrix(st, plan, factors):
-            st.matrix_wanted = True
-            moves = np.inf
-        else:
-            st.matrix_wanted, st.matrix_age, st.rate = False, 0, RATE_OF_FRESH
-            moves = _follow(st, plan, factors, t, later, d, g, True)
-    if moves < np.inf:
-        moves = max(moves, _follow(st, plan, factors, t, first, d, g, False))
+    moves = np.nan
+    if far * far * weighted_max(d, st.w_error) <= PROBED * UNSEEN:
+        moves = _follow(st, plan, factors, t, first, d, g, False)
     for k in range(cells.shape[0]):
         values[k] = st.rdata[cells[k]]
     return moves
