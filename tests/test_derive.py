@@ -96,9 +96,77 @@ def test_choices_are_differentiated_on_the_side_that_is_chosen():
 
 def test_a_branch_of_python_is_refused():
     (x,) = inputs("x")
-    for branch in (lambda: x > 0.0, lambda: bool(x), lambda: 1.0 >= x):
+    for branch in (
+        lambda: x > 0.0,
+        lambda: bool(x),
+        lambda: 1.0 >= x,
+        lambda: x == 1.0,
+        lambda: x != 1,
+        lambda: x in (1, 2),
+    ):
         with pytest.raises(TypeError, match=says("branch", "choose", "maximum")):
             branch()
+
+
+def test_numbers_are_looked_up_by_those_who_trace_alone():
+    x, y = inputs("x y")
+    with derive.watched():
+        for branch in (lambda: x == y, lambda: {1: 2.0}.get(x, 3.0), lambda: x in {1, 2}):
+            with pytest.raises(TypeError, match=says("branch", "choose", "maximum")):
+                branch()
+        value = x * y + x
+    assert {x: 1, y: 2}[y] == 2
+    assert x != y
+    assert derivative(value, y) is x
+
+
+POWERS = {
+    "of powers": lambda x: (x**-3) ** -1 + (x**0.3) ** -0.5 + (x**-0.5) ** 0.4,
+    "of what is negative": lambda x: (-(x**-1)) ** -3 + (2.0 - 3.0 * x) ** -3,
+    "in exponents": lambda x: x ** (x**-0.5) + 2.0 ** (x**-1),
+}
+
+
+@pytest.mark.parametrize("name", POWERS)
+def test_powers_of_powers_are_written_as_they_are_meant(name):
+    (x,) = inputs("x")
+    kernel = compiled(Function("law", "x", "", [POWERS[name](x), *slopes(POWERS[name](x), [x])]))
+    exact = (POWERS[name](0.5), POWERS[name](0.5 + 1e-30j).imag / 1e-30)
+    assert kernel(np.float64(0.5)) == pytest.approx(exact, rel=1e-13)
+
+
+SLACK = {
+    "roots": lambda x, e: np.sqrt(np.maximum(x, 0.0)) + np.sqrt(3.0 * np.maximum(x, 0.0) ** 3),
+    "powers": lambda x, e: np.maximum(x, 0.0) ** 0.8 - (2.0 * -(-np.maximum(x, 0.0))) ** 0.3,
+    "scaled": lambda x, e: (np.maximum(x, 0.0) / 0.3) ** 0.8 + (np.maximum(x, 0.0) ** 1.5) ** 0.5,
+    "exponents": lambda x, e: 5.0 * np.maximum(x, 0.0) ** e,
+    "in between": lambda x, e: np.minimum(np.maximum(x, 0.0), 1.0) ** e,
+}
+
+
+@pytest.mark.parametrize("name", SLACK)
+def test_slack_has_no_slope_whatever_the_exponent(name):
+    """At -0.2 and 0 nothing acts, and nothing changes; at 0.7 it does as the formula says."""
+    x, e = inputs("x e")
+    value = SLACK[name](x, e)
+    kernel = compiled(Function("law", "x, e", "", [value, *slopes(value, (x, e))]))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for at in (-0.2, 0.0):
+            assert kernel(np.float64(at), np.float64(0.8)) == (0.0, 0.0, 0.0)
+    h = 1e-6
+    by = [
+        (SLACK[name](0.7 + a * h, 0.8 + b * h) - SLACK[name](0.7 - a * h, 0.8 - b * h)) / (2.0 * h)
+        for a, b in ((1, 0), (0, 1))
+    ]
+    assert kernel(np.float64(0.7), np.float64(0.8)) == pytest.approx((SLACK[name](0.7, 0.8), *by), rel=1e-8, abs=1e-12)
+
+
+def test_infinite_bounds_are_written_and_nan_is_refused():
+    (x,) = inputs("x")
+    kernel = compiled(Function("law", "x", "", [np.minimum(np.maximum(x, -np.inf), np.inf)]))
+    assert kernel(0.3) == 0.3
+    with pytest.raises(TypeError, match=says("nan")):
+        x + np.nan
 
 
 def test_arrays_of_numbers_have_the_products_of_numpy():

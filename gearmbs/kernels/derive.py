@@ -19,7 +19,8 @@ from __future__ import annotations
 import functools
 import importlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,7 @@ BRANCH = "a branch cannot be traced; use gm.choose(a, b, x, y), x where a > b an
 FLOAT = "it is no float, but written down; for functions of math write those of numpy"
 _nodes: dict[tuple, Value] = {}
 _slopes: dict[tuple[Value, Value], Value] = {}
+_watched: list[bool] = []
 
 
 class Value:
@@ -59,6 +61,17 @@ class Value:
 
     __lt__ = __le__ = __gt__ = __ge__ = _refused
 
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Value) and not _watched:
+            return self is other
+        raise TypeError(BRANCH)
+
+    def __hash__(self) -> int:
+        # a number that is looked up in a mapping or a set is a branch as well
+        if _watched:
+            raise TypeError(BRANCH)
+        return object.__hash__(self)
+
     def __init__(self, operation: str, operands: tuple, name: str = "") -> None:
         self.operation, self.operands, self.name = operation, operands, name
         self.place = len(_nodes)
@@ -70,7 +83,7 @@ class Value:
             return self - other.operands[0]
         if self.operation == "-x":
             return other - self.operands[0]
-        if ZERO in (self, other):
+        if self is ZERO or other is ZERO:
             return other if self is ZERO else self
         if self is other:
             return 2.0 * self
@@ -92,9 +105,9 @@ class Value:
 
     def __mul__(self, other: Any) -> Value:
         other = value_of(other)
-        if ZERO in (self, other):
+        if self is ZERO or other is ZERO:
             return ZERO
-        if ONE in (self, other):
+        if self is ONE or other is ONE:
             return other if self is ONE else self
         for a, b in ((self, other), (other, self)):
             if a.operation == "-x":
@@ -122,12 +135,21 @@ class Value:
 
     def __pow__(self, exponent: Any) -> Value:
         exponent = value_of(exponent)
+        if self is ZERO and (exponent.operation != "number" or exponent.operands[0] > 0.0):
+            return ZERO if exponent.operation == "number" else _node("**", self, exponent)
+        if exponent.operation != "number" or 0.0 < exponent.operands[0] < 1.0:
+            # the slope at zero is infinite: chosen before, not multiplied by zero after
+            sides = _sides(self)
+            if sides:
+                return choose(*sides[:2], *(side**exponent for side in sides[2:]))
         if exponent.operation != "number":
             # written as a product, whose second factor its slope has, too
             return _node("power", self, _node("**", self, exponent - 1.0), exponent)
         n = exponent.operands[0]
         if n in (0.5, 1.0):
             return self.sqrt() if n == 0.5 else self
+        if n == 0.0:
+            return ONE
         if n == 2.0:
             return self * self
         if n > 1.0:
@@ -147,6 +169,8 @@ class Value:
         return value_of(other) / self
 
     def sqrt(self) -> Value:
+        if self is ZERO or _sides(self):
+            return self**0.5
         squares = _squares(self)
         return _node("norm", *squares) if squares else _node("sqrt", self)
 
@@ -227,7 +251,7 @@ class Value:
             yield a, exponent * b
             if exponent.operation != "number":
                 yield exponent, self * a.log()
-        elif kind == "**":
+        elif kind == "**" and a is not ZERO:
             yield a, b * (self / a)
             if b.operation != "number":
                 yield b, self * a.log()
@@ -289,13 +313,17 @@ def _boxed(value: Value) -> Any:
 
 
 def _node(operation: str, *operands: Any, name: str = "") -> Value:
-    key = (operation, *operands)
+    key = (operation, *(id(x) if isinstance(x, Value) else x for x in operands))
     if key not in _nodes:
         _nodes[key] = Value(operation, operands, name)
     return _nodes[key]
 
 
 def _number(number: float) -> Value:
+    if isinstance(number, (str, bytes)):
+        raise TypeError(f"{number!r} is text; write a number, in SI")
+    if np.isnan(float(number)):
+        raise TypeError("a number of it is nan; leave it out")
     return _node("number", float(number))
 
 
@@ -309,7 +337,26 @@ def _squares(value: Value) -> list[Value]:
     if value.operation == "+":
         first, second = map(_squares, value.operands)
         return first + second if first and second else []
-    return [value.operands[0]] if value.operation == "*" and len({*value.operands}) == 1 else []
+    return [value.operands[0]] if value.operation == "*" and value.operands[0] is value.operands[1] else []
+
+
+def _sides(value: Value) -> tuple[Any, ...]:
+    """Return a, b, x, y if a value is x where a > b, else y, and one of both is zero there, or may be."""
+    kind, operands = value.operation, value.operands
+    if kind == "choose":
+        return operands if any(side is ZERO or _sides(side) for side in operands[2:]) else ()
+    if kind == "-x":
+        a, b, *ends = _sides(operands[0]) or (None, None)
+        return (a, b, *(-end for end in ends)) if ends else ()
+    if kind in ("power", "**") and operands[-1].operation == "number" and operands[-1].operands[0] > 0.0:
+        a, b, *ends = _sides(operands[0]) or (None, None)
+        return (a, b, *(end ** operands[-1] for end in ends)) if ends else ()
+    if kind == "*":
+        for one, other in (operands, operands[::-1]):
+            a, b, *ends = _sides(one) or (None, None)
+            if ends:
+                return (a, b, *(end * other for end in ends))
+    return ()
 
 
 def _commuting(operation: str, a: Value, b: Value, fold: Any) -> Value:
@@ -329,6 +376,16 @@ def start() -> None:
     _slopes.clear()
     for number in (ZERO, ONE):
         _nodes["number", number.operands[0]] = number
+
+
+@contextmanager
+def watched() -> Iterator[None]:
+    """Refuse to compare numbers and to look them up, while a function of somebody else is traced."""
+    _watched.append(True)
+    try:
+        yield
+    finally:
+        _watched.pop()
 
 
 def inputs(names: str, array: str = "", first: int | str = 0) -> list[Value]:
@@ -452,7 +509,7 @@ class _Lines:
         """Return the text of a value, after the lines that it needs."""
         kind = value.operation
         if value in self.names or kind in ("given", "number"):
-            return self.names.get(value) or value.name or repr(value.operands[0])
+            return self.names.get(value) or value.name or _digits(value.operands[0])
         parts = [self.told(operand) for operand in value.operands]
         closed = [f"({p})" if re.search(r" [-+*/] |^-", p) and not _whole(p) else p for p in parts]
         if kind == "choose":
@@ -461,7 +518,8 @@ class _Lines:
             text = f"{parts[0]} {kind} {parts[1] if kind == '+' and parts[1][0] != '-' else closed[1]}"
         elif kind in ("*", "**", "power"):
             sign = "**" if kind == "**" else "*"
-            text = f"{_factor(parts[0], closed[0]) if sign == '*' else closed[0]} {sign} {closed[1]}"
+            base = f"({parts[0]})" if " ** " in parts[0] and closed[0] == parts[0] else closed[0]
+            text = f"{_factor(parts[0], closed[0]) if sign == '*' else base} {sign} {closed[1]}"
         elif kind == "-x":
             text = f"-{closed[0]}"
         elif kind == "1/x":
@@ -476,6 +534,11 @@ class _Lines:
             self.names[value] = name
             return name
         return text
+
+
+def _digits(number: float) -> str:
+    """Return a number as text; infinite ones have no name that every compiler knows."""
+    return repr(number).replace("inf", "1e999")
 
 
 def _whole(text: str) -> bool:

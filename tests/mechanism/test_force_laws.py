@@ -164,9 +164,20 @@ def refused_laws():
     yield lambda i, j, c: Wrench(energy=c * i.origin[0]), [1.0], (), says("pad", "mapping")
     yield lambda i, j: 3.0, {}, (), says("pad", "float", "Wrench")
     yield lambda i, j: Wrench(), {}, (), says("pad", "energy", "force")
-    yield lambda i, j: Wrench(force=[1.0, 2.0]), {}, (), says("pad", "5", "three")
+    yield lambda i, j: Wrench(force=[1.0, 2.0]), {}, (), says("pad", "force", "2", "three")
     yield lambda i, j, z: Wrench(force=z * i.origin), {}, ("z",), says("pad", "rates", "z")
     yield lambda i, j, z: Wrench(energy=z * i.origin[0], rates={"z": z}), {}, ("z",), says("pad", "algebraic", "energy")
+    yield lambda i, j, t: Wrench(force=t * i.origin, rates={"t": t}), {}, ("t",), says("pad", "'t'", "name")
+    yield lambda i, j: Wrench(energy=i.velocity @ i.velocity), {}, (), says("pad", "energy", "velocities", "masses")
+    yield lambda i, j: Wrench(force=np.outer(i.origin, j.origin)), {}, (), says("pad", "force", "(3, 3)", "three")
+    yield lambda i, j: Wrench(force=["1 N", 0, 0]), {}, (), says("pad", "force", "1 N", "number")
+    yield lambda i, j: Wrench(energy=np.minimum(i.origin[0], np.nan)), {}, (), says("pad", "nan")
+    yield (
+        lambda i, j: Wrench(force=i.origin * sum(np.sin(k * i.origin[0]) for k in range(1500))),
+        {},
+        (),
+        says("pad", "operations", "parts", "kernel"),
+    )
 
 
 @pytest.mark.parametrize(("function", "numbers", "states", "message"), list(refused_laws()))

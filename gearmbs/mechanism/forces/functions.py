@@ -144,8 +144,16 @@ class FunctionForce(ForceElement):
         if name not in names:
             raise ModelError(f"force '{self.name}': it has no parameter '{name}'; it has {', '.join(names) or 'none'}")
         out = np.zeros((6 + len(self.own_states), len(names)))
-        own = np.zeros(len(self.own_states)) if states is None else states
-        self.law.by_parameters(t, frames, own, self.parameters, out)
+        own = np.zeros(len(self.own_states)) if states is None else np.asarray(states, dtype=float)
+        frames = np.asarray(frames, dtype=float)
+        if own.shape != (len(self.own_states),) or frames.shape != (len(self.markers), FRAME_COLUMNS):
+            raise ModelError(
+                f"force '{self.name}': frames of shape {frames.shape} and states of {own.shape}; give "
+                f"({len(self.markers)}, {FRAME_COLUMNS}) and ({len(self.own_states)},)"
+            )
+        with np.errstate(all="ignore"):
+            # of what is not chosen there may be no number
+            self.law.by_parameters(t, frames, own, self.parameters, out)
         return out[:, names.index(name)]
 
     def __repr__(self) -> str:
@@ -171,7 +179,9 @@ def function_force(
     if isinstance(kernel, ForceLaw):
         if len(diagnostics) or derivatives is not None or steps:
             raise ModelError(f"{label}: a law brings its diagnostics and derivatives along; leave out these, and steps")
-        law = derive_law(label, kernel, len(markers), parameters, [*states, *algebraic], len(algebraic))
+        between = len(markers) == 2 and not markers[1].body.is_ground
+        start = np.array([frame_of(marker) for marker in markers]) if between else None
+        law = derive_law(label, kernel, len(markers), parameters, [*states, *algebraic], len(algebraic), start)
         kernel, derivatives, parameters, diagnostics = law.values, law.derivatives, law.parameters, LAW_DIAGNOSTICS
     numbers = _parameters(label, parameters)
     own = [*_states(label, name, states, False), *_states(label, name, algebraic, True)]

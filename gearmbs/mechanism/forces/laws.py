@@ -7,6 +7,7 @@ states; those by the parameters.
 
 from __future__ import annotations
 
+import ast
 import inspect
 import itertools
 import linecache
@@ -16,6 +17,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.dae.problem import ModelError
@@ -25,6 +27,10 @@ from gearmbs.mechanism.forces.definitions import Frame
 
 _tracing = threading.Lock()
 _numbers = itertools.count()
+AWAY = (1e-3, 1e-2, 0.1, 1.0)
+"""Distances, of that between the markers or of 1 m where there is none, and angles, by which a pose is moved."""
+ALIKE = 1e-6
+"""Part of its slopes by which an energy may change with a motion of both markers: far above rounding."""
 LAW_DIAGNOSTICS = (Diagnostic("energy", "J", "stored"), Diagnostic("loss", "W", "dissipated"))
 
 
@@ -35,9 +41,11 @@ class Wrench:
     Attributes
     ----------
     force, torque : sequence of 3 numbers, optional
-        Default: what the energy asks for, or nothing.
+        Default, of each for itself: what the energy asks for, -dV/dP and -dV/dpi of the first marker. What is given is
+        the whole, with the part of the energy.
     energy : number
-        What is stored, J. Of a law that gives neither force nor torque, both follow from it.
+        What is stored, J, by places, states and time, not by velocities. Between two bodies it is a function of how
+        they stand to each other, as in the axes of the second marker; against the ground any.
     rates : mapping
         Of the states by name: the derivatives of differential ones, the values of algebraic ones.
     """
@@ -98,6 +106,7 @@ def force_law(function: Callable[..., Wrench]) -> ForceLaw:
         ``velocity`` and ``angular_velocity``. It returns a :class:`Wrench`. It is written with arithmetic, powers,
         products of arrays, functions of numpy (roots, exponential, trigonometric and hyperbolic ones and their
         inverses, ``maximum``, ``minimum``, ``abs``, ``hypot``, ``cross``, ``linalg.norm``) and `choose` for branches.
+        Numbers from outside it are those of the moment at which the force is added to a mechanism.
 
     Returns
     -------
@@ -162,9 +171,10 @@ class Derived:
 
 
 def derive_law(
-    label: str, law: ForceLaw, markers: int, parameters: Any, states: Sequence[str], algebraic: int = 0
-) -> Derived:
-    """Return the kernels of a law, which are made once for all elements of it.
+    label: str, law: ForceLaw, markers: int, parameters: Any, states: Sequence[str], algebraic: int = 0,
+    start: np.ndarray | None = None,
+) -> Derived:  # fmt: skip
+    """Return the kernels of a law; elements of it share those that have the same texts.
 
     Parameters
     ----------
@@ -177,6 +187,8 @@ def derive_law(
         Names without the element's.
     algebraic : int
         How many of them, the last, are algebraic.
+    start : ndarray, shape (2, 18), optional
+        Frames about which the energy has to stay as it is if both markers move alike.
 
     Raises
     ------
@@ -184,12 +196,25 @@ def derive_law(
         If the law cannot be traced, or what it takes and gives does not fit.
     """
     numbers = _parameters_of(label, law, markers, parameters, states)
-    key = (markers, tuple(numbers), tuple(states), algebraic)
+    for state in states:
+        if state == "t" or not state.isidentifier():
+            raise ModelError(
+                f"{label}: a law takes its states by name, and '{state}' is "
+                f"{'the time' if state == 't' else 'none of Python'}; give the state another name"
+            )
     with _tracing:
-        if key not in law._made:
-            derive.start()
-            law._made[key] = _traced(label, law, markers, list(numbers), list(states), algebraic)
-        return replace(law._made[key], parameters=numbers)
+        derive.start()
+        try:
+            texts = _traced(label, law, markers, list(numbers), list(states), algebraic, start, numbers)
+        except RecursionError:
+            raise ModelError(
+                f"{label}: the law '{law.__name__}' has too many operations in a row, some hundred terms of a sum; "
+                "add them up in parts, or give a kernel instead"
+            ) from None
+        # what it reads from outside may be other numbers by now
+        if texts not in law._made:
+            law._made[texts] = derived_of(law.__name__, texts, {})
+        return replace(law._made[texts], parameters=numbers)
 
 
 def _parameters_of(label: str, law: ForceLaw, markers: int, given: Any, states: Sequence[str]) -> dict[str, float]:
@@ -215,7 +240,10 @@ def _parameters_of(label: str, law: ForceLaw, markers: int, given: Any, states: 
     return {one.name: given.get(one.name, one.default) for one in named}
 
 
-def _traced(label: str, law: ForceLaw, markers: int, numbers: list[str], states: list[str], algebraic: int) -> Derived:
+def _traced(
+    label: str, law: ForceLaw, markers: int, numbers: list[str], states: list[str], algebraic: int,
+    start: np.ndarray | None, at: Mapping[str, Any],
+) -> tuple[str, ...]:  # fmt: skip
     frames = [Frame("frames", f"m{k}", f"{k}, ") for k in range(markers)]
     seen = [Seen(np.array(f.origin), np.array(f.axes).T, np.array(f.v), np.array(f.w)) for f in frames]
     # under names of their own: the kernels' arguments have some, too
@@ -225,7 +253,10 @@ def _traced(label: str, law: ForceLaw, markers: int, numbers: list[str], states:
     by_name = {**own, **values, "t": t}
     taken = list(inspect.signature(law.function).parameters)[markers:]
     try:
-        load = law.function(*seen, **{name: by_name[name] for name in taken})
+        with derive.watched():
+            load = law.function(*seen, **{name: by_name[name] for name in taken})
+    except RecursionError:
+        raise
     except Exception as error:
         raise ModelError(
             f"{label}: the law '{law.__name__}' cannot be traced, {type(error).__name__}: {error}; write it with "
@@ -237,11 +268,12 @@ def _traced(label: str, law: ForceLaw, markers: int, numbers: list[str], states:
         raise ModelError(
             f"{label}: the law gives rates of {sorted(load.rates)}, its states are {sorted(states)}; give both alike"
         )
-    energy = derive.value_of(load.energy)
-    if any(derivative(energy, one) is not ZERO for one in list(own.values())[len(own) - algebraic :]):
-        raise ModelError(f"{label}: the energy of the law depends on an algebraic state; write it without")
+    (energy,) = _numbers_of(label, "energy", [load.energy])
+    _check_energy(label, energy, frames, list(own.values())[len(own) - algebraic :])
+    if start is not None:
+        _try_energy(label, energy, frames, start, len(own), list(at.values()))
     wrench = _wrench(label, load, energy, frames)
-    rates = [derive.value_of(load.rates[name]) for name in states]
+    rates = [_numbers_of(label, f"rate of '{name}'", [load.rates[name]])[0] for name in states]
     differential = dict(list(zip(own.values(), rates))[: len(own) - algebraic])
     variations = [v for f in frames for v in f.variations]
     rows = [*wrench, *rates]
@@ -255,20 +287,97 @@ def _traced(label: str, law: ForceLaw, markers: int, numbers: list[str], states:
         Function("by_parameters", f"{head}, out", "Write its derivatives by the parameters.",
                  sets=_matrix("out", rows, list(values.values()))),
     ]  # fmt: skip
-    return derived_of(law.__name__, tuple(one.undecorated() for one in made), {})
+    return tuple(one.undecorated() for one in made)
+
+
+def _numbers_of(label: str, what: str, given: Any) -> list[Value]:
+    """Return numbers that a law gives."""
+    found = []
+    for one in given:
+        try:
+            found.append(derive.value_of(one.item() if isinstance(one, np.ndarray) else one))
+        except (TypeError, ValueError) as error:
+            raise ModelError(f"{label}: {what} of the law is {one!r}, {error}; give a number") from None
+    return found
+
+
+def _three(label: str, what: str, given: Any) -> list[Value]:
+    try:
+        shape = np.shape(np.asarray(given, dtype=object))
+    except ValueError:
+        shape = ()
+    if shape != (3,):
+        raise ModelError(f"{label}: {what} of the law has the shape {shape}; give three components")
+    return _numbers_of(label, what, given)
+
+
+def _check_energy(label: str, energy: Value, frames: list[Frame], algebraic: list[Value]) -> None:
+    """Refuse energies whose rate is not that of the places, the differential states and the time."""
+    if any(derivative(energy, one) is not ZERO for one in algebraic):
+        raise ModelError(f"{label}: the energy of the law depends on an algebraic state; write it without")
+    if any(derivative(energy, one) is not ZERO for frame in frames for one in frame.variations[6:]):
+        raise ModelError(
+            f"{label}: the energy of the law depends on velocities, by which it gives no force; leave that part out, "
+            "and give masses and inertias to bodies"
+        )
+
+
+def _try_energy(
+    label: str, energy: Value, frames: list[Frame], start: np.ndarray, states: int, given: list[Any]
+) -> None:
+    """Refuse an energy that changes if both markers move alike: its force would not be that of both bodies."""
+    by = [derivative(energy, one) for frame in frames for one in frame.variations[:6]]
+    try:
+        numbers = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        # refused with the parameters
+        return
+    if all(one is ZERO for one in by):
+        return
+    rng, picked = np.random.default_rng(0), dict[str, bool]()
+    space: dict[str, Any] = {"np": np, "pick": lambda test: picked.setdefault(test, rng.random() > 0.5)}
+    tree = ast.parse(Function("slopes", "t, frames, states, parameters", "Of it.", returns=by).undecorated())
+    exec(compile(tree, "<energy>", "exec"), space)
+    as_chosen = space["slopes"]
+    # what is chosen far from the start alone is tried as well
+    for node in ast.walk(tree):
+        if isinstance(node, ast.IfExp):
+            node.test = ast.parse(f"pick({ast.unparse(node.test)!r})", mode="eval").body
+    exec(compile(tree, "<energy>", "exec"), space)
+    reach = np.linalg.norm(start[0, :3] - start[1, :3]) or AWAY[-1]
+    for away, of in itertools.product((0.0, *AWAY), (as_chosen, space["slopes"])):
+        picked.clear()
+        pose = start.copy()
+        for frame in pose:
+            turn = Rotation.from_rotvec(away * rng.normal(size=3)).as_matrix()
+            frame[:3] += away * reach * rng.normal(size=3)
+            frame[3:12] = (turn @ frame[3:12].reshape(3, 3)).ravel()
+        with np.errstate(all="ignore"):
+            try:
+                found = of(np.float64(0.0), pose, rng.normal(size=states), numbers)
+            except ZeroDivisionError:
+                continue
+        slopes = np.array(found, dtype=float).reshape(2, 2, 3)
+        arm = pose[1, :3] - pose[0, :3]
+        shift, turned = slopes[:, 0].sum(axis=0), slopes[:, 1].sum(axis=0) + np.cross(arm, slopes[1, 0])
+        force = np.abs(slopes[:, 0]).max()
+        torque = max(np.abs(slopes[:, 1]).max(), np.abs(arm).max() * force)
+        for what, change, size in (("shifted", shift, force), ("turned", turned, torque)):
+            if np.abs(change).max() > ALIKE * size:
+                raise ModelError(
+                    f"{label}: the energy of the law changes if both markers are {what} alike, so that its force is "
+                    "not that of both bodies; write it in the axes of j, as (i.origin - j.origin) @ j.axes, or let "
+                    "j be a marker of the ground"
+                )
 
 
 def _wrench(label: str, load: Wrench, energy: Value, frames: list[Frame]) -> list[Value]:
-    """Return F and N on the first marker's body, as given, or as the energy falls."""
-    if load.force is None and load.torque is None:
-        if energy.operation == "number":
-            raise ModelError(f"{label}: the law gives neither force nor torque nor energy; give one of them")
-        return [-derivative(energy, by) for by in frames[0].variations[:6]]
-    nothing = [0.0] * 3
-    wrench = [*(nothing if load.force is None else load.force), *(nothing if load.torque is None else load.torque)]
-    if len(wrench) != 6:
-        raise ModelError(f"{label}: force and torque have {len(wrench)} components together; give three of each")
-    return [derive.value_of(x) for x in wrench]
+    """Return F and N on the first marker's body: each as given, or as the energy falls."""
+    if load.force is None and load.torque is None and energy.operation == "number":
+        raise ModelError(f"{label}: the law gives neither force nor torque nor energy; give one of them")
+    falls = [-derivative(energy, by) for by in frames[0].variations[:6]]
+    force = falls[:3] if load.force is None else _three(label, "force", load.force)
+    return [*force, *(falls[3:] if load.torque is None else _three(label, "torque", load.torque))]
 
 
 def _loss(wrench: list[Value], energy: Value, frames: list[Frame], moved: dict[Value, Value]) -> Value:

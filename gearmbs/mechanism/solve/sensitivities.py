@@ -22,6 +22,7 @@ from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.tangent_track import MOST, MOVED
 from gearmbs.dae.tangents import Direction, Followed, follow
+from gearmbs.mechanism.forces.functions import FunctionForce
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.accuracy import chosen_accuracy
@@ -240,7 +241,7 @@ def built(build: Callable[..., Mechanism], values: Mapping[str, float]) -> Mecha
 
 
 def check_functions(name: str, mechanism: Mechanism, other: Mechanism) -> None:
-    """Refuse functions of Python that are other ones each time: what of the parameter is in them cannot be seen."""
+    """Refuse functions of Python and laws that are other ones each time: what of a parameter is in them is not seen."""
     for key, known in mechanism.functions.items():
         found = other.functions.get(key)
         if found is not None and (found.function, found.partials) != (known.function, known.partials):
@@ -248,6 +249,24 @@ def check_functions(name: str, mechanism: Mechanism, other: Mechanism) -> None:
                 f"parameter {name!r}: function {known.name!r} is another object in each mechanism that build returns, "
                 "and what it takes of the parameter is not seen; define it outside build, with parameters as arguments"
             )
+    for key, element in mechanism.elements.items():
+        if _inside(element) != _inside(other.elements.get(key, element)):
+            raise ModelError(
+                f"parameter {name!r}: numbers inside the function of force {element.name!r} change with it, and are "
+                f"not seen; let it take them as its own, and give parameters={{{name!r}: ...}} to the force"
+            )
+
+
+def _inside(element: Any) -> Any:
+    """Return what has the numbers that stand inside the function of a force: the texts of a law, those of a closure."""
+    if not isinstance(element, FunctionForce):
+        return None
+    if element.law is not None:
+        return element.law.texts
+    function = getattr(element.function, "py_func", element.function)
+    cells = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+    plain = [cell.tolist() if isinstance(cell, (np.ndarray, np.number)) else cell for cell in cells]
+    return [repr(cell) for cell in plain if isinstance(cell, (int, float, list, tuple))]
 
 
 def direction_of(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEProblem, width: float) -> Direction:
