@@ -137,7 +137,7 @@ def test_powers_of_powers_are_written_as_they_are_meant(name):
 
 SLACK = {
     "roots": lambda x, e: np.sqrt(np.maximum(x, 0.0)) + np.sqrt(3.0 * np.maximum(x, 0.0) ** 3),
-    "powers": lambda x, e: np.maximum(x, 0.0) ** 0.8 - (2.0 * -(-np.maximum(x, 0.0))) ** 0.3,
+    "powers": lambda x, e: np.maximum(x, 0.0) ** 0.8 - (-2.0 * -np.maximum(x, 0.0)) ** 0.3,
     "scaled": lambda x, e: (np.maximum(x, 0.0) / 0.3) ** 0.8 + (np.maximum(x, 0.0) ** 1.5) ** 0.5,
     "exponents": lambda x, e: 5.0 * np.maximum(x, 0.0) ** e,
     "in between": lambda x, e: np.minimum(np.maximum(x, 0.0), 1.0) ** e,

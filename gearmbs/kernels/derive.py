@@ -352,7 +352,7 @@ def _sides(value: Value) -> tuple[Any, ...]:
         a, b, *ends = _sides(operands[0]) or (None, None)
         return (a, b, *(end ** operands[-1] for end in ends)) if ends else ()
     if kind == "*":
-        for one, other in (operands, operands[::-1]):
+        for one, other in (operands, operands[::-1])[: 1 if operands[0] is operands[1] else 2]:
             a, b, *ends = _sides(one) or (None, None)
             if ends:
                 return (a, b, *(end * other for end in ends))

@@ -217,5 +217,21 @@ def test_names_of_a_law_are_its_own_and_a_mechanism_with_one_travels():
         assert element.by_parameter("wrench", place)[0] == pytest.approx(-1.5)
 
 
+def test_derivatives_by_parameters_at_the_edge_of_slack():
+    """Where a base is a literal zero that is chosen: nothing changes, and Python's division by zero is not met."""
+
+    def law(i, k, e=0.8):
+        x = i.origin[0]
+        return Wrench(force=[-k * np.maximum(np.maximum(x, 0.0) + np.minimum(-x, 0.0), 0.0) ** e, 0.0, 0.0])
+
+    made = derive_law("force 'x'", force_law(law), 1, {"k": 3.0}, ())
+    out, place = np.zeros((6, 2)), np.zeros((1, 18))
+    for x in (-0.1, 0.0):
+        place[0, 0] = x
+        with np.errstate(all="ignore"):
+            made.by_parameters(0.0, place, np.zeros(0), np.array([3.0, 0.8]), out)
+        assert not out.any()
+
+
 def test_numbers_may_be_chosen_without_tracing():
     assert choose(2.0, 1.0, "a", "b") == "a"

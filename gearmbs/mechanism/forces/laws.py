@@ -17,7 +17,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gearmbs.dae.equations.loads.forces import Diagnostic
 from gearmbs.dae.problem import ModelError
@@ -297,7 +296,8 @@ def _numbers_of(label: str, what: str, given: Any) -> list[Value]:
         try:
             found.append(derive.value_of(one.item() if isinstance(one, np.ndarray) else one))
         except (TypeError, ValueError) as error:
-            raise ModelError(f"{label}: {what} of the law is {one!r}, {error}; give a number") from None
+            shown = f"an array of shape {one.shape}" if isinstance(one, np.ndarray) else f"{one!r}, {error}"
+            raise ModelError(f"{label}: {what} of the law is {shown}; give a number") from None
     return found
 
 
@@ -326,6 +326,8 @@ def _try_energy(
     label: str, energy: Value, frames: list[Frame], start: np.ndarray, states: int, given: list[Any]
 ) -> None:
     """Refuse an energy that changes if both markers move alike: its force would not be that of both bodies."""
+    from scipy.spatial.transform import Rotation
+
     by = [derivative(energy, one) for frame in frames for one in frame.variations[:6]]
     try:
         numbers = np.array(given, dtype=float)
@@ -402,6 +404,13 @@ def _matrix(array: str, rows: Sequence[Value], by: Sequence[Value]) -> dict[str,
     return {place: slope for place, slope in slopes.items() if slope is not ZERO}
 
 
+class _Literals(ast.NodeTransformer):
+    """Floats of a text become numbers of numpy."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
+        return ast.Call(ast.Name("f8", ast.Load()), [node], []) if isinstance(node.value, float) else node
+
+
 def derived_of(name: str, texts: tuple[str, ...], parameters: Mapping[str, float]) -> Derived:
     """Return the kernels of a law from their texts, which are found by the names of their files."""
     space: dict[str, Any] = {"np": np}
@@ -409,6 +418,9 @@ def derived_of(name: str, texts: tuple[str, ...], parameters: Mapping[str, float
         file = f"<law {name} {next(_numbers)}>"
         linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
         exec(compile(text, file, "exec"), space)
+    # the one that nobody compiles: literals divide as numbers of arrays do
+    tree, space["f8"] = _Literals().visit(ast.parse(texts[2])), np.float64
+    exec(compile(ast.fix_missing_locations(tree), "<law>", "exec"), space)
     return Derived(space["values"], space["derivatives"], space["by_parameters"], parameters, name, texts)
 
 
