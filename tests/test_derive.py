@@ -132,6 +132,8 @@ def test_powers_of_powers_are_written_as_they_are_meant(name):
     (x,) = inputs("x")
     kernel = compiled(Function("law", "x", "", [POWERS[name](x), *slopes(POWERS[name](x), [x])]))
     exact = (POWERS[name](0.5), POWERS[name](0.5 + 1e-30j).imag / 1e-30)
+    # alone, no part of it has a name
+    assert compiled(Function("law", "x", "", [POWERS[name](x)]))(0.5) == pytest.approx(exact[0], rel=1e-14)
     assert kernel(np.float64(0.5)) == pytest.approx(exact, rel=1e-13)
 
 
