@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any
 
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 
@@ -34,7 +33,7 @@ def counted_at(kind: Any) -> Any:
     @intrinsic
     def at(typingctx, address):
         def codegen(context, builder, signature, args):
-            value = cgutils.create_struct_proxy(kind)(context, builder)
+            value = context.make_helper(builder, kind)
             value.meminfo = builder.inttoptr(args[0], value.meminfo.type)
             found = value._getvalue()
             context.nrt.incref(builder, kind, found)
@@ -50,7 +49,7 @@ def place_of(typingctx, counted):
     """Return the address at which a structref is counted."""
 
     def codegen(context, builder, signature, args):
-        value = cgutils.create_struct_proxy(signature.args[0])(context, builder, value=args[0])
+        value = context.make_helper(builder, signature.args[0], value=args[0])
         return builder.ptrtoint(value.meminfo, context.get_value_type(types.int64))
 
     return types.int64(counted), codegen
