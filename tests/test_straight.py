@@ -7,6 +7,7 @@ import pytest
 
 from gearmbs.kernels import texts
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.straight import straight
 from tests.says import says
 
 
@@ -57,3 +58,8 @@ def test_text_that_has_changed_since_it_was_read_is_left_to_numba(tmp_path):
     texts.linecache.checkcache(str(path))
     with pytest.raises(OSError, match=says("law.py", "imported")):
         texts.text_of(space["law"])
+
+
+def test_what_is_compiled_of_a_kernel_is_of_its_module():
+    """Of no module it would be kept with the builtins of the process, to which an interactive one adds anything."""
+    assert straight(one_number.py_func).__module__ == __name__

@@ -53,7 +53,8 @@ def straight(function: Callable, fastmath: Any = ()) -> Callable:
         made = functools.partial(_instructions, tree, liberties)
         return typing.signature(result, *kinds), lambda c, b, signature, args: made(c, b, signature, args)
 
-    space: dict[str, Any] = {"typed": typed}
+    # a function of no module is kept with all that it can name, the builtins of the process among that
+    space: dict[str, Any] = {"typed": typed, "__name__": function.__module__}
     exec(f"def defined(typingctx, {names}):\n    return typed({names})", space)
     space["called"] = intrinsic(space["defined"])
     exec(compile(f"def {tree.name}({names}):\n    return called({names})", "<straight>", "exec"), space)
