@@ -42,7 +42,8 @@ def test_a_stop_between_the_first_two_points_behind_a_jump_is_met(integrator):
         if u is not None:
             sim.set("u", u)
         sim.advance(float(t))
-        # 504 tolerances where the block behind the jump did not look at its start
+        # 504 tolerances where the block behind the jump did not look at its start; with nothing set a kink costs 6, and
+        # here each of three starts and the kink leave some tolerances
         assert sim.get("angular_velocity", "d")[2] == pytest.approx(speed, abs=30e-7)
 
 

@@ -188,12 +188,13 @@ def take_block(functions, st, plan, factors):
         renew_weights(st, rows[0], h)
         if _settle_points(functions, st, plan, factors, h):
             error = _block_error(st, h)
-            if error <= BLOCK_ERROR and _unsettled_at_start(functions, st, plan, factors) <= BLOCK_ERROR:
+            if error > BLOCK_ERROR:
+                st.h_block = h * max(BLOCK_SHRINK, (target(st, BLOCK_ORDER) / error) ** (1.0 / POINTS))
+            elif _unsettled_at_start(functions, st, plan, factors) > BLOCK_ERROR:
+                st.h_block = BLOCK_SHRINK * h
+            else:
                 _go_on(st, h)
                 return RUNNING
-            st.h_block = h * max(BLOCK_SHRINK, (target(st, BLOCK_ORDER) / error) ** (1.0 / POINTS))
-            if error <= BLOCK_ERROR:
-                st.h_block = BLOCK_SHRINK * h
             spread = h
         else:
             st.h_block = BLOCK_SHRINK * h

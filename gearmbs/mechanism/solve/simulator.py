@@ -16,7 +16,6 @@ from gearmbs._lazy import Guessed, uncollected
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
-from gearmbs.dae.integrators.stepping.jumps import LED
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.model.system import settle_states
 from gearmbs.dae.problem import DAEProblem, ModelError, Number
@@ -566,11 +565,7 @@ class Simulator(Sampled, Restored, Guessed):
         if done is None:
             return None
         code, row = done
-        settings.waiting.clear()
-        if code & LED:
-            settings.led[name] = t
-        elif settings.led:
-            settings.led.clear()
+        settings.take_steered(name, code, t)
         return row
 
     def _start_with(self, values: np.ndarray) -> None:
