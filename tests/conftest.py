@@ -1,8 +1,11 @@
 """Numerical libraries run on one thread, so that timings do not depend on the machine; what is skipped has a reason."""
 
+import gc
 import os
 import re
 from pathlib import Path
+
+import pytest
 
 from tests import private_parts
 
@@ -16,6 +19,17 @@ if os.environ.get("GEARMBS_COMPILER") == "plain":
 PAGE = Path(__file__).parent.parent / "docs" / "development.md"
 SKIPPED: dict[str, str] = {}
 """Tests, and files, that were skipped, and why."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Keep what is imported and collected, which stays for the whole run, out of the collector's way."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def allowed_reasons() -> list[str]:

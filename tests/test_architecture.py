@@ -186,6 +186,7 @@ def test_every_package_has_its_place():
     assert rooms == set(MAY_KNOW)
 
 
+@pytest.mark.slow
 def test_every_exception_is_needed():
     used = {(room(name), room(target)) for name, targets in arrows().items() for target in targets}
     assert set(EXCEPTIONS) <= used
@@ -222,6 +223,7 @@ def test_dae_does_not_know_gears_by_name():
     assert not wrong
 
 
+@pytest.mark.slow
 def test_no_circles_among_modules():
     """A package and its own modules apart: a package's list of what it exports names them."""
     modules = module_files()

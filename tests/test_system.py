@@ -11,6 +11,7 @@ import ast
 import errno
 import io
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -54,10 +55,17 @@ MAY = {
 """Uses elsewhere, and why."""
 
 
+THERE = re.compile(rf"\b(?:import|from) (?:{'|'.join(sorted(ONLY_THERE))})\b|\bos\.\w|\bsys\.platform\b|/proc")
+"""What the text of a module has somewhere if it uses any of these."""
+OPENS = re.compile(r"open\(|read_text\(|write_text\(")
+"""The same of one that opens a file as text."""
+
+
 def uses(path: Path) -> set[str]:
     """Return what a module uses that not every system has."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    text, found = path.read_text(encoding="utf-8"), set()
+    # most modules have none of these words, and need not be parsed
+    for node in ast.walk(ast.parse(text)) if THERE.search(text) else ():
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names} & ONLY_THERE
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -75,8 +83,8 @@ def uses(path: Path) -> set[str]:
 
 def texts_of_any_code_page(path: Path) -> list[int]:
     """Return the lines where a text is read or written in whatever code page the machine has."""
-    found = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    text, found = path.read_text(encoding="utf-8"), []
+    for node in ast.walk(ast.parse(text)) if OPENS.search(text) else ():
         if not isinstance(node, ast.Call) or any(k.arg == "encoding" for k in node.keywords):
             continue
         plain, name = isinstance(node.func, ast.Name), ast.unparse(node.func).rpartition(".")[2]

@@ -9,6 +9,14 @@ import pytest
 from gearmbs._lazy import uncollected
 
 
+@pytest.fixture(autouse=True)
+def nothing_frozen():
+    """As in a program of a user's; `tests/conftest.py` freezes what it collects."""
+    gc.unfreeze()
+    yield
+    gc.freeze()
+
+
 @pytest.fixture
 def module(tmp_path, monkeypatch):
     """A module that has not been imported, whose objects the collector follows."""

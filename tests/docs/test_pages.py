@@ -48,9 +48,14 @@ def test_modules_named_in_prose_exist():
             assert any(file.endswith(f"/{name}") for file in files), f"{name_of(page)} names {name}"
 
 
+@pytest.fixture(scope="module")
+def commands():
+    """The commands of the program by name."""
+    return typer.main.get_command(app).commands
+
+
 @pytest.mark.parametrize("path", ALL, ids=name_of)
-def test_commands_exist_with_their_options(path):
-    commands = typer.main.get_command(app).commands
+def test_commands_exist_with_their_options(path, commands):
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.M))
     for block in blocks(path):
         for line in block.code.replace("\\\n", " ").splitlines() if block.language == "console" else ():

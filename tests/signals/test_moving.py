@@ -89,6 +89,7 @@ def test_reports_name_what_drifts_and_doubt_no_speed():
     assert "CHECK THE SPEED" not in diagnose_bearing(seen, "6205", f"{60 * TURN} rpm").verdict
 
 
+@pytest.mark.slow
 @pytest.mark.hunt
 @pytest.mark.parametrize("draw", range(20))
 def test_drifts_and_run_ups_of_many_machines_are_told_apart(draw):
