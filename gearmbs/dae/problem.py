@@ -152,9 +152,9 @@ class Number:
         for place in self.places:
             place.write(table, t, value, slope)
 
-    def placed(self, first: Callable[[int], int]) -> Number:
-        """Return the number with all places counted in the whole table, in which a part begins at ``first(part)``."""
-        return replace(self, places=tuple(replace(p, at=p.at + first(p.table), table=-1) for p in self.places))
+    def placed(self, header: np.ndarray) -> Number:
+        """Return the number with all places counted in the whole table, whose parts begin at ``header[part]``."""
+        return replace(self, places=tuple(replace(p, at=p.at + int(header[p.table]), table=-1) for p in self.places))
 
     def moved_to(self, cells: np.ndarray) -> Number:
         """Return the number with its places in a table that holds those in ``cells``, which increase, alone."""

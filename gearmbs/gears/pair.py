@@ -418,7 +418,7 @@ class GearPair(PairGeometry, Shown):
         """Stiffness of the mesh in the transverse plane over that of a tooth pair: epsilon_alpha cos beta_b."""
         return max(1.0, self.contact_ratio) * math.cos(self.driver.base_helix_angle)
 
-    @property
+    @cached_property
     def _face_share(self) -> float:
         """Share of the law's stiffness that the faces have as they stand."""
         return self.contact_model.face_share(self)
@@ -454,9 +454,15 @@ class GearPair(PairGeometry, Shown):
         """Sum of normal forces that carries the load torque, N: F_n = T / (r_b2 cos beta_b)."""
         return self.operating_point.normal_force(self)
 
+    @cached_property
+    def _own_force(self) -> float:
+        """Normal force at the operating point, N."""
+        return self.operating_point.normal_force(self)
+
     def _force(self, torque: Quantity) -> float:
-        point = self.operating_point
-        return (point if torque is None else replace(point, torque=torque, owner="GearPair")).normal_force(self)
+        if torque is None:
+            return self._own_force
+        return replace(self.operating_point, torque=torque, owner="GearPair").normal_force(self)
 
     def penetration(self, torque: Quantity = None, pairs: int = 1) -> float:
         """Static penetration when ``pairs`` tooth pairs share a torque on the driven wheel (N m) equally, m."""

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gearmbs.studies import Case, CaseError, SimulationFailed, load_case, make_case, run_case, run_cases
-from gearmbs.studies.case.limits import check_record, edge, remarks, slip
+from gearmbs.studies.case.limits import check_record, remarks
+from gearmbs.studies.run.recorder import slip
 from tests.says import says
 
 
@@ -113,8 +114,8 @@ def test_the_shortest_record_that_is_accepted_is_long_enough():
     assert gmf_rms(signal, case.mesh_frequency)["band"].shape == (3, 1)
     slow = Case(solver={"signal_rate": 1600.0, "output_rate": 51200.0})
     # Kaiser's 100 dB over a tenth of the new rate: half the filter is 0.5 (100 - 7.95)/(2.285 2 pi 0.1 f) = 20 ms
-    assert edge(slow) == pytest.approx(0.5 * 92.05 / (2.285 * 2 * np.pi * 0.1 * 1600.0), rel=0.02)
-    assert edge(case) == 0.01
+    assert slow.edge == pytest.approx(0.5 * 92.05 / (2.285 * 2 * np.pi * 0.1 * 1600.0), rel=0.02)
+    assert case.edge == 0.01
 
 
 def _refusal(case, **how):
@@ -129,11 +130,11 @@ def test_wheels_that_slipped_past_each_other():
     """Half a base pitch: pi m cos(20 deg) / 2 = 4.523 mm."""
     case = Case()
     t = np.array([0.0, 0.1, 0.2])
-    assert slip(case, t, np.array([0.0, 4.5e-3, 1e-5])) is None
+    assert slip(case.pair(), t, np.array([0.0, 4.5e-3, 1e-5])) is None
     assert "t = 0.1 s the transmission error passes half a base pitch (4.523 mm)" in slip(
-        case, t, np.array([0.0, -4.6e-3, 1e-5])
+        case.pair(), t, np.array([0.0, -4.6e-3, 1e-5])
     )
-    assert slip(case, t, np.array([0.0, np.nan, 1e-5])) is not None
+    assert slip(case.pair(), t, np.array([0.0, np.nan, 1e-5])) is not None
 
 
 def test_a_slipping_run_fails_and_keeps_what_it_computed(monkeypatch):

@@ -76,7 +76,7 @@ def test_it_shows_and_saves_itself(speeds, tmp_path):
 
 def test_errors_are_kept_in_their_places(monkeypatch):
     monkeypatch.setattr(
-        recorder, "slip", lambda case, *a: "the wheels slipped" if case.operation.torque > 90.0 else None
+        recorder, "slip", lambda pair, *a: "the wheels slipped" if pair.operating_point.torque > 90.0 else None
     )
     study = sweep(Case(operation=SHORT), "operation.torque", [50.0, "100 N m"], errors="keep")
     assert list(study.failures) == ["case, torque 100 N m"]

@@ -93,6 +93,7 @@ class RequestEvaluator:
         system = solution.system
         self.marker_body, self.marker_frame = system.model.marker_body.copy(), system.model.marker_frame.copy()
         self.kin, self.acc = frame_motion(solution.evaluated)
+        self._jumps = rows_of_jumps(solution.t, solution.jumped)
         index: dict[int, int] = system.marker_index  # type: ignore[attr-defined]
         self.scope: Scope = model.scope(index, list(self.marker_body))
         self._names = {index[id(m)]: m.name for m in markers_of(model.mechanism)}
@@ -146,14 +147,14 @@ class RequestEvaluator:
             y[:, q] = self._unknown(key)
         tape = tape.bind(tape.algebraic.index)
         self._note(tape)
-        starts = starting_angles(tape, self._turns, self._marker_named)
+        starts = starting_angles(tape, self._turns, self._marker_named) if tape.angles else []
         named = [(function, self._marker_named(i), self._marker_named(j)) for function, i, j in tape.angles]
         known = [known_turns(self.solution, *names, self.model.mechanism.turns.get(names)) for names in named]
-        with raised_errors(self.model.mechanism.functions.values()):
-            t, jumps = self.solution.t, rows_of_jumps(self.solution.t, self.solution.jumped)
+        functions = self.model.mechanism.functions
+        with raised_errors(functions.values()) if functions else contextlib.nullcontext():
             return expression_values(
-                tape, starts, known, t, jumps, self.kin, self.acc, self.marker_body, self.marker_frame, y,
-                self._marker_named,
+                tape, starts, known, self.solution.t, self._jumps, self.kin, self.acc, self.marker_body,
+                self.marker_frame, y, self._marker_named,
             )[0]  # fmt: skip
 
     def variables(self) -> dict[int, np.ndarray]:

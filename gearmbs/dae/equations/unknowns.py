@@ -141,7 +141,7 @@ def offsets(counts: Counts, formulation: int) -> dict[str, int]:
         "F": 3 * counts.forces,
         "N": 3 * counts.torques,
         "z": counts.states,
-        "mu": counts.rows if has_rate_rows.py_func(formulation) else 0,
+        "mu": counts.rows if rows_have_rates(formulation) else 0,
     }
     at, next_free = {}, 0
     for block in BLOCKS:
@@ -161,6 +161,10 @@ def has_rate_rows(formulation):
 def multipliers_are_rates(formulation):
     """Whether lambda and mu are derivatives of unknowns."""
     return formulation == SI1
+
+
+rows_have_rates, multipliers_stand_as_rates = has_rate_rows.py_func, multipliers_are_rates.py_func
+"""The same two answers, for Python."""
 
 
 def places(counts: Counts, formulation: int) -> np.ndarray:
@@ -225,7 +229,7 @@ def differential_mask(at: dict[str, int], formulation: int, states: np.ndarray) 
     mask[: at["eps"]] = True
     mask[at["R"] : at["lambda"]] = True
     mask[at["z"] : at["mu"]] = states
-    if multipliers_are_rates.py_func(formulation):
+    if multipliers_stand_as_rates(formulation):
         mask[at["lambda"] : at["F"]] = True
         mask[at["mu"] :] = True
     return mask
@@ -234,7 +238,7 @@ def differential_mask(at: dict[str, int], formulation: int, states: np.ndarray) 
 def given_by_momenta(at: dict[str, int], formulation: int) -> np.ndarray:
     """Return which unknowns under error control follow from the momenta p and p_f: eps and v_f, with rate rows."""
     mask = np.zeros(at["n"], dtype=bool)
-    if has_rate_rows.py_func(formulation):
+    if rows_have_rates(formulation):
         mask[at["eps"] : at["R"]] = True
     return mask
 
@@ -244,7 +248,7 @@ def error_mask(at: dict[str, int], formulation: int, states: np.ndarray) -> np.n
     mask = np.zeros(at["n"], dtype=bool)
     mask[at["R"] : at["lambda"]] = True
     mask[at["z"] : at["mu"]] = states
-    if has_rate_rows.py_func(formulation):
+    if rows_have_rates(formulation):
         mask[velocities(at)] = True
     return mask
 
@@ -335,7 +339,7 @@ def named(
     owners = {"lambda": rows, "F": forces, "N": torques, "z": states, "mu": rows}
     out: list[Unknown] = []
     for block, (meaning, equation, unit) in BLOCKS.items():
-        if block == "mu" and not has_rate_rows.py_func(formulation):
+        if block == "mu" and not rows_have_rates(formulation):
             continue
         if block in MODAL:
             names = [f"{block}_{k + 1}({body})" for body, n in zip(bodies, counts.modes) for k in range(n)]

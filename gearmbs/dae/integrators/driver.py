@@ -33,7 +33,7 @@ from gearmbs.dae.linalg.entry_lists import (
     RATE_ALLOWED,
     STEPS_A_PLAN,
 )
-from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse, parity
+from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse, lines_for, parity
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
@@ -95,6 +95,8 @@ class Run:
         self.indptr = np.asarray(problem.indptr, dtype=np.int64)
         self.indices = np.asarray(problem.indices, dtype=np.int64)
         self.scale = np.asarray(problem.scale, dtype=float)
+        self.lines = lines_for(self.indptr, self.indices)
+        """Scratch of the search for pivots."""
         self.functions = bind(
             problem.residual,
             problem.jacobian,
@@ -134,7 +136,7 @@ class Run:
             self.pivots = Pivots(st.matrix.copy(), drop, negligible, None if counted is None else counted.copy())
             self.plan = analyse(
                 self.indptr, self.indices, st.matrix, self.scale, drop, counted, negligible,
-                with_tail=problem.small_entries, couplings=problem.couplings,
+                with_tail=problem.small_entries, couplings=problem.couplings, lines=self.lines,
             )  # fmt: skip
             st.gamma_planned = st.gamma
             st.plan_sign = direct(parity)(self.plan.row_from) * direct(parity)(self.plan.col_to)

@@ -219,18 +219,18 @@ def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     if tail < len(rows):
         l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
         u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
-    lists = entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices)
-    f = dict(zip(FIELDS_BY_COLUMNS, lists, strict=True), l_ptr=l_ptr, node_end=nodes(l_ptr, lists[L_POS]))
+    lists = direct(entry_lists)(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices)
+    f = dict(zip(FIELDS_BY_COLUMNS, lists, strict=True), l_ptr=l_ptr, node_end=direct(nodes)(l_ptr, lists[L_POS]))
     n, blocks = len(rows), None
     if tail < n:
         fields, blocks = front_blocks(tail, l_ptr, f["l_pos"])
         f |= fields | entries_in_blocks(tail, blocks.keys, f["a_ptr"], f["a_pos"], f["a_src"], f["a_scale"])
-        f["node_end"] = nodes(f["l_ptr"], f["l_pos"])
+        f["node_end"] = direct(nodes)(f["l_ptr"], f["l_pos"])
         in_nodes = f["node_end"] > np.arange(1, n + 1)
         if np.diff(f["l_ptr"])[in_nodes].sum() < MOSTLY_NODES * len(f["l_pos"]):
             # column by column all others would act on the tail one after the other, too
             f["node_end"] = np.arange(1, n + 1)
-    if has_nodes(f["node_end"]):
+    if direct(has_nodes)(f["node_end"]):
         order, step, u_at = column_by_column(tail, f["u_pos"], f["u_col"], f["l_pos"], f["l_col"], n)
     else:
         order, step, u_at = schedule(
@@ -368,6 +368,12 @@ def new_lines(n: int, size: int) -> tuple[Lines, Lines]:
     return _layout(n, size, True).new(), _layout(n, size, False).new()
 
 
+def lines_for(indptr: np.ndarray, indices: np.ndarray) -> tuple[Lines, Lines]:
+    """Return `new_lines` with room for what mostly fills in when a matrix of a pattern is eliminated."""
+    n = len(indptr) - 1
+    return new_lines(n, 3 * len(indices) + 4 * n)
+
+
 def analyse(
     indptr: np.ndarray,
     indices: np.ndarray,
@@ -378,6 +384,7 @@ def analyse(
     negligible: float = NEGLIGIBLE,
     with_tail: bool = False,
     couplings: np.ndarray | None = None,
+    lines: tuple[Lines, Lines] | None = None,
 ) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
 
@@ -402,6 +409,8 @@ def analyse(
     couplings : ndarray of bool, optional
         Entries that are left out up to `COUPLING_LIMIT`, unless they have counted before, if ``negligible`` is the
         first of `NEGLIGIBLE_IN_NEWTON`.
+    lines : pair of Lines, optional
+        Scratch of `lines_for` the pattern, for who analyses many matrices of it; default new ones.
 
     Returns
     -------
@@ -418,16 +427,15 @@ def analyse(
         raise ValueError("the matrix has entries that are not finite")
     scale, choose = np.asarray(scale, dtype=float), direct(scale_and_choose)
     n = len(indptr) - 1
-    size = 3 * len(indices) + 4 * n
+    columns, rows = lines_for(indptr, indices) if lines is None else lines
     counted = np.ones(len(indices), dtype=bool) if counted is None else counted
     spared = None if couplings is None or negligible < NEGLIGIBLE_IN_NEWTON[0] else couplings & ~counted
     whole, vals = vals, vals if spared is None else np.where(spared, 0.0, vals)
     while True:
-        columns, rows = new_lines(n, size)
         rank, *chosen = choose(indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, columns, rows)
         if rank >= 0:
             break
-        size *= 2
+        columns, rows = new_lines(n, 2 * len(columns.pool))
     if rank < n and not counted.all():
         return analyse(indptr, indices, vals, scale, drop, with_tail=with_tail)
     if rank < n and drop == 0.0:

@@ -389,10 +389,10 @@ class Assembler:
         self, configurations: Sequence[Configuration], times: np.ndarray, states: np.ndarray
     ) -> list[Columns]:
         """Return Phi_q at each of some configurations."""
-        return [
-            self.constraints(configuration, float(t), states)[0]
-            for configuration, t in zip(configurations, times, strict=True)
-        ]
+        places = zip(configurations, times.tolist(), strict=True)
+        matrices = [self.at(configuration, t, None, states).matrix for configuration, t in places]
+        base = int(self._tables[0][T.H_COORDINATES])
+        return [matrix.below(base, base) for matrix in matrices]
 
 
 class Evaluator:

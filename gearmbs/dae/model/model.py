@@ -364,7 +364,7 @@ class Model:
 
     def numbers_in(self, idata: np.ndarray) -> dict[str, Number]:
         """Return what can be changed by its name, with its places among the numbers packed with ``idata``."""
-        return {name: number.placed(lambda table: int(idata[table])) for name, number in self.numbers.items()}
+        return {name: number.placed(idata) for name, number in self.numbers.items()}
 
     @cached_property
     def _packed(self) -> dict[int, tuple[np.ndarray, dict[int, np.ndarray], np.ndarray]]:

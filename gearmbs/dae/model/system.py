@@ -17,7 +17,7 @@ from gearmbs.dae.equations.bodies.body import turning_rates
 from gearmbs.dae.equations.constraints.terms import ANGLE
 from gearmbs.dae.equations.kinematics import AXES, hook
 from gearmbs.dae.equations.loads.reactions import reactions_from
-from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Unknown, multipliers_are_rates
+from gearmbs.dae.equations.unknowns import FORMULATIONS, I3, Unknown, multipliers_stand_as_rates
 from gearmbs.dae.model import diagnosis, initial
 from gearmbs.dae.model.base_system import BaseSystem
 from gearmbs.dae.model.diagnosis import conflict
@@ -170,7 +170,7 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
     first = int(found.idata[T.H_F])
     y[: at["lambda"]] = found.y[: at["lambda"]]
     y[at["F"] : at["mu"]] = found.y[first:]
-    (yp if multipliers_are_rates.py_func(form) else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
+    (yp if multipliers_stand_as_rates(form) else y)[at["lambda"] : at["lambda"] + len(lam)] = lam
     indptr, indices, slots = jacobian.pattern(idata, rdata, size, system.t0, y)
     idata, rdata, size = model.pack(form, slots, codes)
     work = np.zeros(size)

@@ -101,7 +101,11 @@ class Watch:
         if self.turns:
             self.idata[-1] = size
             size += problem.n * (1 + 6 * int(self.idata[T.H_FORCES]))
-        self.n = problem.n
+        self.n, idata = problem.n, self.idata
+        self._places = T.rows_in(idata, int(idata[T.H_I_AT]), int(idata[T.H_BODIES]), T.AT_COLUMNS)
+        """Where the unknowns of the integrated bodies are."""
+        self._rows = T.rows_in(idata, int(idata[T.H_I_ROW]), int(idata[T.H_ROWS]) + 1, T.ROW_COLUMNS)
+        self._terms = T.rows_in(idata, int(idata[T.H_I_TERM]), int(idata[T.H_TERMS]), T.TERM_COLUMNS)
         self.readers: dict[tuple[str, str], Reader] = {}
         kinds = {
             "reaction_force": self._reaction_force,
@@ -165,7 +169,7 @@ class Watch:
             return lambda steps: np.tile(placed, (len(steps.y), 1, 1))
         if self.turns:
             return self._orientation_about_axis(number)
-        row = self._places_of(body)
+        row = self._places[body]
         if row[T.AT_ANGLES] != 3:
             return None
         first, place = int(row[T.AT_THETA]), int(self.idata[T.H_I_CODE]) + body
@@ -187,10 +191,6 @@ class Watch:
 
         return int(self.members.group[number]), self.members.place[number, PLACE_A:PLACE_MASS].reshape(3, 3)
 
-    def _places_of(self, body: int) -> np.ndarray:
-        """Return where the unknowns of an integrated body are."""
-        return T.rows_in(self.idata, int(self.idata[T.H_I_AT]), int(self.idata[T.H_BODIES]), T.AT_COLUMNS)[body]
-
     def _angular_velocity(self, name: str) -> Reader | None:
         """Return a reader of a body's angular velocity, global components."""
         if name not in self.system.model.names.bodies:
@@ -201,7 +201,7 @@ class Watch:
             return lambda steps: np.zeros((len(steps.y), 3))
         if self.turns:
             return self._angular_velocity_about_axis(body)
-        row = self._places_of(body)
+        row = self._places[body]
         if row[T.AT_ANGLES] != 3:
             return None
         angles, rates = int(row[T.AT_THETA]), int(row[T.AT_EPS])
@@ -259,8 +259,7 @@ class Watch:
             return None if rows is None else self._force_inside(rows)
         if self.members is not None or self.idata[T.H_FORMULATION] != SI2:
             return None
-        table = T.rows_in(self.idata, int(self.idata[T.H_I_ROW]), int(self.idata[T.H_ROWS]) + 1, T.ROW_COLUMNS)
-        term = T.rows_in(self.idata, int(self.idata[T.H_I_TERM]), int(self.idata[T.H_TERMS]), T.TERM_COLUMNS)
+        table, term = self._rows, self._terms
         coefficients = self.rdata[int(self.idata[T.H_R_COEF]) :]
         parts = []
         for r in rows:
@@ -420,12 +419,14 @@ class Stream:
         size = -(-t.size // max(1, round(t.size / self.part_size)))
         for k in range(0, t.size, size):
             rows = y[k : k + size]
-            part = self.whole.over(t[k : k + size], rows[:, :n], [(0, idata)])
+            steps = Steps(rows[:, :n], rows[:, n:], idata)
+            told = None if self.watch is None else self.watch.read(steps)
+            part = self.whole.over(t[k : k + size], steps.y, [(0, idata)])
             if self.conflict is None and part.t[-1] >= self.next_look:
                 self.next_look = float(part.t[-1]) + self.interval
                 self.conflict = part.find_conflict(np.array([part.t.size - 1]))
-            if self.watch is not None:
-                part.at_steps = self.watch.read(Steps(rows[:, :n], rows[:, n:], idata))
+            if told is not None:
+                part.at_steps = told
             self.consumer(part)
 
     def close(self, solution: Solution) -> Solution:

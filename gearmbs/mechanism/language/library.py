@@ -429,7 +429,9 @@ def compile_expression(
     builder = TapeBuilder(scope.marker_body, outline)
     lowering = Lowering(builder, scope, text, FUNCTIONS)
     result = lowering.whole(parse(text))
-    result = builder.binary(op.MUL, builder.constant(scope.units.factor(dimension)), result)
+    factor = scope.units.factors[dimension]
+    if factor != 1.0:
+        result = builder.binary(op.MUL, builder.constant(factor), result)
     tape = builder.finish(result, text)
     if tape.level == op.LEVEL_ACCELERATION and not accelerations:
         raise NotEvaluatedError(

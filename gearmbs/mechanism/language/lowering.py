@@ -213,8 +213,8 @@ class Lowering:
 
     def scaled(self, register: int, dimension: str) -> int:
         """Return an SI value in the expression's own units."""
-        factor = 1.0 / self.scope.units.factor(dimension)
-        return self.builder.binary(op.MUL, self.builder.constant(factor), register)
+        factor = 1.0 / self.scope.units.factors[dimension]
+        return register if factor == 1.0 else self.builder.binary(op.MUL, self.builder.constant(factor), register)
 
     def ref(self, node: Node) -> Ref:
         """Return the id or name an argument stands for."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, TypeVar
 
 from gearmbs.dae.equations.expressions.opcodes import ExpressionError
@@ -106,12 +106,19 @@ class Units:
     force: float = 1.0
     mass: float = 1.0
 
+    @cached_property
+    def factors(self) -> dict[str, float]:
+        """SI value of one unit of each of ``DIMENSIONS``."""
+        return {
+            dimension: self.mass**mass * self.length**length * self.time**time * self.force**force
+            for dimension, (mass, length, time, force) in DIMENSIONS.items()
+        }
+
     def factor(self, dimension: str) -> float:
         """Return the SI value of one unit of ``dimension``, a key of ``DIMENSIONS``."""
         if dimension not in DIMENSIONS:
             raise ValueError(f"dimension {dimension!r} is not one of {', '.join(DIMENSIONS)}")
-        mass, length, time, force = DIMENSIONS[dimension]
-        return self.mass**mass * self.length**length * self.time**time * self.force**force
+        return self.factors[dimension]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ has the value read as it is where the object is made.
 from __future__ import annotations
 
 from abc import ABCMeta
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -40,8 +40,9 @@ class Made(ABCMeta):
         made = super().__call__(*args, **options)
         own = vars(made)
         for key, read in cls.reads.items():  # type: ignore[attr-defined]
-            if isinstance(own.get(key), str) or has_quantity(own.get(key)):
-                own[key] = read(own[key], f"{cls.__name__} '{own.get('name', '')}': {key}")
+            value = own.get(key)
+            if isinstance(value, str) or (isinstance(value, Sequence) and has_quantity(value)):
+                own[key] = read(value, f"{cls.__name__} '{own.get('name', '')}': {key}")
         own["_made"] = True
         return made
 

@@ -286,7 +286,7 @@ class JointMethods:
             except Exception as error:
                 reason = f"{type(error).__name__}: {error}"
                 raise ModelError(f"{label}: the rows of JOINTS[{kind!r}] fail with {reason}") from error
-            return self._add_joint(Joint(name, kind, mi, mj, rows))
+            return self._add_joint(name, kind, mi, mj, rows)
 
     def fixed(
         self, name: str, i: Body | Marker, j: Body | Marker, *, at: Vector | None = None, axis: Vector | None = None,
@@ -346,7 +346,7 @@ class JointMethods:
         pitch = quantity(pitch, "length", f"joint '{name}': pitch")
         mi, mj = self._markers(f"joint '{name}'", name, i, j, at, axis)
         with _markers_kept_if_added((mi, mj), (i, j)):
-            return self._add_joint(Joint(name, "screw", mi, mj, screw_rows(mi, mj, pitch)))
+            return self._add_joint(name, "screw", mi, mj, screw_rows(mi, mj, pitch))
 
     @keeps_given
     def distance(self, name: str, i: Marker, j: Marker, length: QuantityLike | None = None) -> Joint:
@@ -358,7 +358,7 @@ class JointMethods:
         if not length > 0.0:
             raise ModelError(f"joint '{name}': length = {length} m; a distance joint needs a positive length")
         row = Row(f"distance {length:g} m", (Term(terms.DISTANCE, i, j),), constant(length))
-        return self._add_joint(Joint(name, "distance", i, j, [row]))
+        return self._add_joint(name, "distance", i, j, [row])
 
     def coupler(self, name: str, parts: list[tuple[Joint, float]], offset: QuantityLike | None = None) -> Joint:
         """Couple joint coordinates linearly: sum of coefficient x coordinate stays at its initial value.
@@ -380,7 +380,7 @@ class JointMethods:
         if offset is None:
             offset = sum(t.coefficient * initial_coordinate(t) for t in row_terms)
         row = Row("coupled coordinates", row_terms, constant(offset))
-        return self._add_joint(Joint(name, "coupler", parts[0][0].i, parts[0][0].j, [row]))
+        return self._add_joint(name, "coupler", parts[0][0].i, parts[0][0].j, [row])
 
     def gear(self, name: str, first: Joint, second: Joint, ratio: float) -> Joint:
         """Let the second joint turn ``ratio`` times as fast as the first, both about their own z_J (see coupler).
@@ -422,7 +422,7 @@ class JointMethods:
         given = self._prescribed(name, function, level, start, rate, coordinate_term(joint, 1.0), "rad")
         moved = _displacement(name, function, given, "rad")
         row = Row("angle", (Term(terms.ROTATION, joint.i, joint.j),), None, moved)
-        return self._add_joint(Joint(name, "rotation", joint.i, joint.j, [row], given))
+        return self._add_joint(name, "rotation", joint.i, joint.j, [row], given)
 
     @keeps_given
     def translation(
@@ -434,7 +434,7 @@ class JointMethods:
         along = Term(terms.DOT2, joint.i, joint.j, Z)
         given = self._prescribed(name, function, level, start, rate, along, "m")
         row = Row("displacement", (along,), _displacement(name, function, given, "m"))
-        return self._add_joint(Joint(name, "translation", joint.i, joint.j, [row], given))
+        return self._add_joint(name, "translation", joint.i, joint.j, [row], given)
 
     # --- checks -----------------------------------------------------------------------------------
 
@@ -501,14 +501,17 @@ class JointMethods:
                 kind = getattr(table[name], "kind", title)
                 raise ModelError(f"name {name!r}: it is in use by a {title} ({kind}); choose another")
 
-    def _add_joint(self, joint: Joint) -> Joint:
-        self._check_name(joint.name)
-        bodies = joint.i.body, joint.j.body
+    def _add_joint(
+        self, name: str, kind: str, i: Marker, j: Marker, rows: list[Row], prescribed: Prescribed | None = None
+    ) -> Joint:
+        self._check_name(name)
+        bodies = i.body, j.body
         for body in bodies:
-            self._check_body(f"joint '{joint.name}'", body)
+            self._check_body(f"joint '{name}'", body)
+        joint = Joint(name, kind, i, j, rows, prescribed)
         for body in bodies:
             body.check(joint)
-        self.joints[joint.name] = joint
+        self.joints[name] = joint
         return joint
 
 

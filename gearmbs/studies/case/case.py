@@ -17,7 +17,8 @@ A case is written in Python with floats in SI or texts with units, or in TOML::
 
 from __future__ import annotations
 
-from functools import cached_property
+import math
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
@@ -58,6 +59,9 @@ SIGNAL_RATE, OUTPUT_RATE = 12800.0, 51200.0
 
 KEPT_HARMONICS, ANALYSER = 5, 2.56
 """Mesh harmonics that a default rate holds, and the ratio of rate to highest frequency that analysers use."""
+
+EDGE = 0.01
+"""Simulated beyond both ends of the record at least, s, for the filters to settle."""
 
 FINER = 0.1
 """Tolerance of a record at `AUTO` over that of others: a mesh period of the paper's states then repeats itself to 0.2 %
@@ -256,6 +260,11 @@ class Case(Section, Shown):
             rate *= 2.0
         return rate
 
+    @cached_property
+    def edge(self) -> float:
+        """What is simulated beyond both ends of the record, s: half the length of the anti-alias filter."""
+        return _edge(self.output_rate, self.signal_rate)
+
     def changed(self, **sections: Unpack[CaseKeywords]) -> Case:
         """Return a copy with fields of its sections changed.
 
@@ -284,6 +293,18 @@ class Case(Section, Shown):
         """Return all settings as nested dictionaries, quantities as the user wrote them, else in SI."""
         parts = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: part.settings() if isinstance(part, Section) else part for name, part in parts.items()}
+
+
+@lru_cache(maxsize=64)
+def _edge(rate: float, signal_rate: float) -> float:
+    """Return `Case.edge` by the rates of the forces and of the signal made of them."""
+    from gearmbs.signals.filters import decimation_taps
+
+    ratio = round(rate / signal_rate)
+    if ratio == 1:
+        return EDGE
+    taps = decimation_taps(ratio, rate).size
+    return max(EDGE, math.ceil(0.5 * taps + 1) / rate)
 
 
 def make_case(data: Mapping[str, object], source: str = "case") -> Case:

@@ -1,4 +1,4 @@
-"""What a case must satisfy to give a useful record, checked before it is simulated and after.
+"""What a case must satisfy to give a useful record, checked before it is simulated.
 
 The record goes through an anti-alias filter and through band-passes about the mesh harmonics. Whether their bands fit
 below half the sampling rate and whether the record is long enough follows from the settings alone.
@@ -7,42 +7,21 @@ below half the sampling rate and whether the record is long enough follows from 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
 from gearmbs.gears.spec import COUNTED_TWICE
 from gearmbs.signals.analysis.bands import ATTENUATION_DB, HALF_WIDTH, MIN_PERIODS, TRANSITION
-from gearmbs.signals.filters import bandpass_taps, decimation_taps
+from gearmbs.signals.filters import bandpass_taps
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.sections import AUTO, LONGEST
 
 HARMONICS = 3
-EDGE = 0.01
-"""Simulated beyond both ends of the record at least, s, for the filters to settle."""
-
 DEEPEST = 0.25
 """Static penetration of one tooth pair, in modules, beyond which teeth would have to pass through each other."""
 
 LEAST_TURNS = 4.25
 """Revolutions that a record of changing speed must hold."""
-
-SLIPPED = 0.5
-"""Transmission error, in base pitches, beyond which teeth have passed each other."""
-
-
-def edge(case: Case) -> float:
-    """Return what must be simulated beyond both ends of the record, s: half the length of the anti-alias filter."""
-    return _edge(case.output_rate, case.signal_rate)
-
-
-@lru_cache(maxsize=64)
-def _edge(rate: float, signal_rate: float) -> float:
-    ratio = round(rate / signal_rate)
-    if ratio == 1:
-        return EDGE
-    taps = decimation_taps(ratio, rate).size
-    return max(EDGE, math.ceil(0.5 * taps + 1) / rate)
 
 
 def check_record(case: Case, source: str = "", *, bands: bool = False) -> None:
@@ -79,7 +58,7 @@ def check_record(case: Case, source: str = "", *, bands: bool = False) -> None:
         _check_length(case, source, bands)
     else:
         _check_curve(case, source)
-    ahead = edge(case)
+    ahead = case.edge
     if operation.run_up + operation.settling < ahead:
         raise CaseError(
             f"{source}: operation.settling = {operation.settling:g} s: run_up and settling are "
@@ -173,26 +152,6 @@ def check_stiffness(case: Case, source: str) -> None:
             f"{case.gears.module * 1e3:.4g} mm; give a stiffer contact (the paper's is '2.9852e5 N/mm^1.3') or less "
             "torque"
         )
-
-
-def slip(case: Case, t: np.ndarray, transmission_error: np.ndarray) -> str | None:
-    """Return a sentence about the first time teeth passed each other, or None if they never did.
-
-    Parameters
-    ----------
-    t, transmission_error : ndarray, shape (m,)
-        s and m, at the driven base circle.
-    """
-    limit = SLIPPED * case.pair().driver.base_pitch
-    beyond = np.flatnonzero(~(np.abs(transmission_error) <= limit))
-    if beyond.size == 0:
-        return None
-    first = int(beyond[0])
-    return (
-        f"the wheels slipped past each other: at t = {t[first]:.6g} s the transmission error passes half a base pitch "
-        f"({limit * 1e3:.4g} mm). The contact does not hold the load; raise contact.stiffness, or lower "
-        "operation.torque or operation.speed, or make operation.run_up longer"
-    )
 
 
 def remarks(case: Case) -> list[str]:

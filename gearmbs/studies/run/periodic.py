@@ -31,7 +31,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.signals.conversion import COMPONENTS, component_values
 from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.case import Case
-from gearmbs.studies.case.limits import HARMONICS, edge, geometric_period
+from gearmbs.studies.case.limits import HARMONICS, geometric_period
 from gearmbs.studies.run.levels import bands_of_lines
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Recorder, Span
 
@@ -343,4 +343,4 @@ def signal_stop(case: Case, span: Span) -> float:
 
 def reach(case: Case, span: Span) -> float:
     """Return how far beyond its ends a record must be known for its filters and the whole acceleration, s."""
-    return signal_stop(case, span) - span.stop + edge(case) + (MARGIN + 4) / case.output_rate
+    return signal_stop(case, span) - span.stop + case.edge + (MARGIN + 4) / case.output_rate

@@ -21,7 +21,7 @@ from gearmbs.signals.filters import apply_zero_phase, decimation_taps
 from gearmbs.signals.resampling import monotone_cubic
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.drive import drive_angle
-from gearmbs.studies.case.limits import edge, remarks
+from gearmbs.studies.case.limits import remarks
 from gearmbs.studies.case.sections import units_of_fields
 from gearmbs.studies.run.levels import LEVELS, level_parts, mesh_levels, tracked_levels
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of
@@ -91,7 +91,7 @@ def evaluate(
     signal_stop = stop if signal_stop is None else signal_stop
     made = wanted - {"gmf_rms"} if levels is not None else wanted
     if even:
-        first = int(np.searchsorted(known.t, start - edge(case) - 0.5 / case.output_rate))
+        first = int(np.searchsorted(known.t, start - case.edge - 0.5 / case.output_rate))
         contact = {name: values[first:] for name, values in known.contact.items()}
         known = Measured(known.t[first:], known.forces[first:], known.error[first:], contact)
     forces = _even_forces(case, known, start, signal_stop if made & {"acceleration"} else stop, made, even=even)
@@ -142,7 +142,7 @@ def _even_forces(
     wheels += [2] if wanted & {"force_2", "acceleration", *LEVELS} else []
     if not wheels:
         return None
-    ahead = edge(case)
+    ahead = case.edge
     names = [f"{wheel}{axis}" for wheel in wheels for axis in "xyz"]
     first, last = 3 * (wheels[0] - 1), 3 * wheels[-1]
     if wanted & {"acceleration", *LEVELS}:
@@ -184,7 +184,7 @@ def _series(
 
 def _even_times(case: Case, known: Measured, start: float, stop: float, *, even: bool) -> np.ndarray:
     """Return the times at which forces would be, to the last digit."""
-    rate, ahead = case.output_rate, edge(case)
+    rate, ahead = case.output_rate, case.edge
     if even:
         return known.t
     first, last = int(np.ceil((start - ahead) * rate - 1e-6)), int(np.floor((stop + ahead) * rate + 1e-6))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import float64, void
@@ -14,8 +14,10 @@ from gearmbs.dae.results.watched import some_of
 from gearmbs.kernels.jit import njit
 from gearmbs.signals.resampling import MARGIN, EvenSamples
 from gearmbs.studies.case.case import Case
-from gearmbs.studies.case.limits import edge, slip
 from gearmbs.studies.run import rig
+
+if TYPE_CHECKING:
+    from gearmbs.gears.pair import GearPair
 
 SMOOTH = {"normal_force": "N", "penetration_drive": "m", "penetration_back": "m"}
 COUNTS = {"pairs_drive": "1", "pairs_back": "1"}
@@ -37,6 +39,9 @@ WATCHED = (
 
 TURN_BEFORE = 0.02
 """Turns of the faster wheel between the steps that are looked at before the span of a record's filters."""
+
+SLIPPED = 0.5
+"""Transmission error, in base pitches, beyond which teeth have passed each other."""
 
 
 class Span(NamedTuple):
@@ -71,7 +76,7 @@ class _Turned:
     """Follows the angles by which the wheels have turned, for the lag of the driven one."""
 
     def __init__(self, case: Case) -> None:
-        pair = case.pair()
+        self.pair = pair = case.pair()
         place = pair.placement(0.0)
         self._axes = np.array([place.axes_1, place.axes_2])
         self._ratio = case.gears.teeth[0] / case.gears.teeth[1]
@@ -80,10 +85,9 @@ class _Turned:
         self._pitch = pair.driver.base_pitch
         self._whole: float | None = None
 
-    def error(self, part: Solution) -> np.ndarray:
-        """Return the transmission error of the next part of a solution, m."""
-        first, second = map(part.orientation, rig.GEARS)
-        error = np.empty(part.t.size)
+    def error(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return the transmission error, m, at the next steps from the orientations of the wheels, each (m, 3, 3)."""
+        error = np.empty(len(first))
         _lags(first, second, self._axes, self._last, self._ratio, self._lag, error)
         if self._whole is None:
             # what starts with the wheels turned is counted from the nearest tooth
@@ -124,13 +128,13 @@ def _taken(part: Solution, turned: _Turned) -> np.ndarray:
 
     Each column is on end in memory, as filters take it.
     """
+    forces, wheels, told = map(part.reaction_force, rig.SEATS), map(part.orientation, rig.GEARS), part.contact(rig.MESH)
     columns = np.empty((FORCES + 1 + len(CONTACT), part.t.size)).T
-    for k, seat in enumerate(rig.SEATS):
-        columns[:, 3 * k : 3 * k + 3] = part.reaction_force(seat)
+    for k, force in enumerate(forces):
+        columns[:, 3 * k : 3 * k + 3] = force
     x, y, z = columns[:, 3 : FORCES - 1].T
     columns[:, FORCES - 1] = np.sqrt(x * x + y * y + z * z)
-    columns[:, FORCES] = turned.error(part)
-    told = part.contact(rig.MESH)
+    columns[:, FORCES] = turned.error(*wheels)
     for k, name in enumerate(CONTACT, FORCES + 1):
         columns[:, k] = told[name]
     return columns
@@ -156,6 +160,27 @@ def measure(case: Case, solution: Solution, rows: np.ndarray | None = None) -> M
     return _joined([(part.t.copy(), _taken(part, turned)) for part in solution.parts(rows)])
 
 
+def slip(pair: GearPair, t: np.ndarray, transmission_error: np.ndarray) -> str | None:
+    """Return a sentence about the first time teeth of a pair passed each other, or None if they never did.
+
+    Parameters
+    ----------
+    pair : GearPair
+    t, transmission_error : ndarray, shape (m,)
+        s and m, at the driven base circle.
+    """
+    limit = SLIPPED * pair.driver.base_pitch
+    beyond = np.flatnonzero(~(np.abs(transmission_error) <= limit))
+    if beyond.size == 0:
+        return None
+    first = int(beyond[0])
+    return (
+        f"the wheels slipped past each other: at t = {t[first]:.6g} s the transmission error passes half a base pitch "
+        f"({limit * 1e3:.4g} mm). The contact does not hold the load; raise contact.stiffness, or lower "
+        "operation.torque or operation.speed, or make operation.run_up longer"
+    )
+
+
 def rows_of_record(case: Case, t: np.ndarray, begin: float | None = None) -> np.ndarray:
     """Return the numbers of the output times a record is made from.
 
@@ -177,7 +202,7 @@ def span_of(case: Case) -> Span:
 
 def span_begin(case: Case) -> float:
     """Return the time at which the span of a record's filters begins, s."""
-    return span_of(case).start - edge(case) - (MARGIN + 1) / case.output_rate
+    return span_of(case).start - case.edge - (MARGIN + 1) / case.output_rate
 
 
 class Separations:
@@ -237,7 +262,7 @@ class Recorder:
         self._parts: list[Taken] = []
         self._samples: EvenSamples | None = None
         if begin is None:
-            (start, stop), ahead = span_of(case), edge(case)
+            (start, stop), ahead = span_of(case), case.edge
             self._samples = EvenSamples(
                 case.output_rate, start - ahead, stop + ahead, smooth=1, linear=len(SMOOTH), held=len(COUNTS)
             )
@@ -285,13 +310,13 @@ class Recorder:
         """
         self._model, self._turned = period, _Turned(self.case)
         columns = np.concatenate([_taken(part, self._turned) for part in period.parts()])
-        self.slipped = slip(self.case, period.t, columns[:, FORCES])
+        self.slipped = slip(self._turned.pair, period.t, columns[:, FORCES])
         self._parts += [(period.t[rows] + later, columns[rows]) for rows, later in copies]
 
     def _add(self, part: Solution, turned: _Turned) -> None:
         """Keep what is recorded of a part of a solution."""
         t, columns = part.t.copy(), _taken(part, turned)
-        self.slipped = self.slipped or slip(self.case, t, columns[:, FORCES])
+        self.slipped = self.slipped or slip(turned.pair, t, columns[:, FORCES])
         if self._samples is None:
             self._parts.append((t, columns))
         else:

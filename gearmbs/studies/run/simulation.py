@@ -16,7 +16,7 @@ from gearmbs.dae.results.solution import Solution
 from gearmbs.gears.contact_element import contact_kernels
 from gearmbs.mechanism.solve.simulate import simulate
 from gearmbs.studies.case.case import Case, CaseError
-from gearmbs.studies.case.limits import check_record, edge, slip
+from gearmbs.studies.case.limits import check_record
 from gearmbs.studies.case.sections import Operation, Solver
 from gearmbs.studies.run import rig
 from gearmbs.studies.run.accuracy import Recorded, accurate_record
@@ -29,7 +29,7 @@ from gearmbs.studies.run.record import (
     evaluate,
     time_series,
 )
-from gearmbs.studies.run.recorder import WATCHED, Measured, Recorder, Separations, measure, rows_of_record
+from gearmbs.studies.run.recorder import WATCHED, Measured, Recorder, Separations, measure, rows_of_record, slip
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -127,7 +127,7 @@ def simulate_case(
     load_kernels(case.solver.integrator, case.lump)
     mechanism = case_mechanism(case) if mechanism is None else mechanism
     operation, solver = case.operation, case.solver
-    t_end = operation.run_up + operation.settling + operation.longest + edge(case)
+    t_end = operation.run_up + operation.settling + operation.longest + case.edge
     # up to a whole sample
     t_end = np.ceil(t_end * case.output_rate - 1e-6) / case.output_rate
     return simulate(
@@ -271,11 +271,12 @@ def _recorded(
     recorder = Recorder(case) if periodic is None else periodic.recorder
     apart = Separations(case) if precision is not None and periodic is None else None
 
-    def take(part: Solution) -> None:
+    def take_both(part: Solution) -> None:
         recorder.take(part)
         if apart is not None:
             apart.take(part)
 
+    take = recorder.take if apart is None else take_both
     options: dict[str, Any] = {"every_step": True, "consumer": take, "watch": WATCHED}
     if periodic is not None and INTEGRATORS[case.solver.integrator].can("pause"):
         options["pause"] = periodic.pause
@@ -365,7 +366,7 @@ def record(case: Case, solution: Solution, mechanism: Mechanism | None = None) -
         If teeth slipped past each other.
     """
     known = measure(case, solution, rows_of_record(case, solution.t))
-    slipped = slip(case, known.t, known.error)
+    slipped = slip(case.pair(), known.t, known.error)
     dataset = _evaluated(case, solution, known, slipped, even=_is_even(solution.t, case.output_rate))
     dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
     return dataset
