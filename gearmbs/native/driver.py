@@ -72,7 +72,10 @@ class Driver(Struct):
     steer: int
     pass_jump: int
     scale_and_choose: int
+    lists_of_plan: int
     factor: int
+    solve: int
+    converges_without: int
     # where the run stands
     t: float  # the present point
     present: int  # its row among the outputs
@@ -87,7 +90,6 @@ class Driver(Struct):
     watch_t: float
     watch_progress: float
     repivots: int
-    deforms: bool  # whether pivots without Python take all entries
     last_t: Vector
     last_rows: Matrix
     last_y: Vector

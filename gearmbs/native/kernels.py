@@ -17,9 +17,11 @@ from gearmbs.dae.integrators.step import advance
 from gearmbs.dae.integrators.stepping.jumps import pass_jump, steer
 from gearmbs.dae.integrators.stepping.memory import value_between
 from gearmbs.dae.integrators.stepping.reach import reach
+from gearmbs.dae.linalg.left_out import converges_without
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, scale_and_choose
 from gearmbs.dae.linalg.pivoting import LINES_TYPE
-from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, factor
+from gearmbs.dae.linalg.plan_lists import lists_of_plan
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, factor, solve
 from gearmbs.dae.model.evaluator import evaluate_rows
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.bound import FUNCTIONS_TYPE, NAMES
@@ -27,7 +29,7 @@ from gearmbs.kernels.jit import Kernel
 from gearmbs.kernels.pointers import address, no_events, no_hook
 from gearmbs.mechanism.solve.simulator import Begun
 from gearmbs.native.driver import DRIVER_TYPE, go_to
-from gearmbs.native.pivots import ROOM_TYPE, choose_for_run, factor_anew
+from gearmbs.native.pivots import ROOM_TYPE, choose_for_run
 from gearmbs.native.setting import apply, present_value
 from gearmbs.native.teller import TELLER_TYPE, choose_for_outputs, factor_for_outputs, tell
 
@@ -40,8 +42,7 @@ CALLED = {
     "go_to": (go_to, int64(FUNCTIONS_TYPE, STATE_TYPE, PART_TYPE, *_PLANNED, DRIVER_TYPE, float64)),
     "apply": (apply, int64(FUNCTIONS_TYPE, STATE_TYPE, *_PLANNED, DRIVER_TYPE, int64)),
     "present_value": (present_value, float64(STATE_TYPE, DRIVER_TYPE, int64)),
-    "choose_for_run": (choose_for_run, int64(STATE_TYPE, DRIVER_TYPE, *_ROOM)),
-    "factor_anew": (factor_anew, int64(STATE_TYPE, DRIVER_TYPE, *_PLANNED)),
+    "choose_for_run": (choose_for_run, int64(STATE_TYPE, DRIVER_TYPE, *_ROOM, *_PLANNED)),
     "tell": (tell, int64(STATE_TYPE, DRIVER_TYPE, TELLER_TYPE, *_PLANNED, int64)),
     "choose_for_outputs": (choose_for_outputs, int64(STATE_TYPE, DRIVER_TYPE, TELLER_TYPE, *_ROOM, *_PLANNED)),
     "factor_for_outputs": (factor_for_outputs, int64(DRIVER_TYPE, TELLER_TYPE, *_PLANNED)),
@@ -49,7 +50,10 @@ CALLED = {
 """Kernels that the hand-written part calls, by what it calls them, with their signatures (``source/model.h``)."""
 
 
-BY_ADDRESS = advance, reach, value_between, settle_output, steer, pass_jump, scale_and_choose, factor
+BY_ADDRESS = (
+    advance, reach, value_between, settle_output, steer, pass_jump, scale_and_choose, lists_of_plan, factor, solve,
+    converges_without,
+)  # fmt: skip
 """Kernels that those call by the addresses in `gearmbs.native.driver.Driver`."""
 
 

@@ -15,11 +15,14 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
+import numpy as np
+
 import gearmbs
 from gearmbs.dae.problem import ModelError
 from gearmbs.files import write_whole
 from gearmbs.kernels import PLAIN
 from gearmbs.mechanism.mechanism import Mechanism
+from gearmbs.mechanism.parts.bodies import markers_kept
 from gearmbs.mechanism.solve.simulator import Begun, Simulator
 from gearmbs.native.fmu import Description, variables_of, write_fmu
 from gearmbs.native.kernels import Kernels
@@ -39,6 +42,8 @@ TARGETS = {"so": None, "fmu2": "2.0", "fmu3": "3.0"}
 SOURCES = {"so": (), "fmu2": ("fmu.c", "fmi2.c"), "fmu3": ("fmu.c", "fmi3.c")}
 """Sources beside those of every library."""
 HEADERS = ("gearmbs.h", "model.h", "fmu.h")
+FEWEST_ZEROS = 256
+"""Zeros in a row that are not written to the library: a piece of memory takes 16 bytes in its list."""
 FLAGS = ("-O2", "-std=c11", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra")
 
 
@@ -135,14 +140,15 @@ def export(
         for name, number in begun.problem.numbers.items()
         if not number.prescribes and all(place.order == 0 for place in number.places)
     }
-    told, left = chosen_outputs(begun.system, begun.problem, list(numbers), outputs)
-    names = ["time", *numbers, *(one.name for one in told)]
-    for twice in {name for name in names if names.count(name) > 1}:
-        raise ModelError(
-            f"output {twice!r}: the name is given twice; leave one of the two out, or give it another name"
-        )
-    kernels = Kernels(begun)
-    memory = memory_of(begun, numbers, told, kernels.number, deforms=begun.problem.small_entries)
+    kernels, m = Kernels(begun), begun.system.mechanism
+    with markers_kept((m.ground, *m.bodies.values())):
+        told, left = chosen_outputs(begun.system, begun.problem, list(numbers), outputs)
+        names = ["time", *numbers, *(one.name for one in told)]
+        for twice in {name for name in names if names.count(name) > 1}:
+            raise ModelError(
+                f"output {twice!r}: the name is given twice; leave one of the two out, or give it another name"
+            )
+        memory = memory_of(begun, numbers, told, kernels.number)
     processor = processor or PORTABLE.get(platform.machine(), "native")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -211,6 +217,24 @@ def _array(kind: str, name: str, items: Sequence[Any]) -> str:
     return f"static {kind} {name}[] = {{{', '.join(map(str, items)) or '0'}}};"
 
 
+def pieces_of(block: np.ndarray) -> np.ndarray:
+    """Return the parts of a block of memory that are not zeros alone.
+
+    Parameters
+    ----------
+    block : ndarray of uint8
+
+    Returns
+    -------
+    ndarray of int64, shape (pieces, 2)
+        Where each begins and ends.
+    """
+    at = np.flatnonzero(block)
+    gaps = np.flatnonzero(np.diff(at) > FEWEST_ZEROS)
+    first, last = at[np.append(0, gaps + 1)], at[np.append(gaps, len(at) - 1)]
+    return np.stack([first, last + 1], axis=1).astype(np.int64)
+
+
 def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[Told], t_end: float) -> tuple[str, str]:
     """Return the part of the model's description that does not depend on its objects, and a token for all of it."""
     layout = memory.layout
@@ -223,11 +247,14 @@ def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[T
     lines = [_array("const char *const", key, [_text(text) for text in texts]) for key, texts in names.items()]
     lines.append(_array("const int64_t", "inside", layout.inside.tolist()))
     lines.append(_array("const int64_t", "functions", layout.functions.ravel().tolist()))
+    pieces = pieces_of(layout.block)
+    lines.append(_array("const int64_t", "pieces", pieces.ravel().tolist()))
     token = hashlib.sha256("\n".join([digest, title, *lines]).encode()).hexdigest()[:32]
     fields = {
         "name": _text(title), "digest": _text(digest), "token": _text(token),
         "t_start": repr(float(begun.point.t)), "t_end": repr(float(t_end)),
         "block": layout.block.size, "state": layout.state, "size": layout.size,
+        "piece_count": len(pieces), "pieces": "pieces",
         "inside_count": len(layout.inside), "function_count": len(layout.functions),
         "inside": "inside", "functions": "functions", "kernels": "kernels",
         "late_count": "LATE", "late_names": "late_names", "late": "late",
@@ -248,7 +275,8 @@ def _compile(
     objects = {one.symbol: one.code for one in (*called.values(), *numbered, *late.values())}
     for symbol, code in objects.items():
         (room / f"{symbol}.o").write_bytes(code)
-    memory.layout.block.tofile(room / "block.bin")
+    block = memory.layout.block
+    np.concatenate([block[first:end] for first, end in pieces_of(block).tolist()]).tofile(room / "block.bin")
     declared = sorted({one.symbol for one in (*numbered, *late.values())})
     head = [
         '#include "model.h"',

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -10,13 +11,17 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.dae.integrators.bdf import HISTORY
+from gearmbs.dae.integrators.driver import Run
 from gearmbs.dae.integrators.run_state import RunState
 from gearmbs.dae.integrators.stepping.jumps import TERMS
-from gearmbs.dae.linalg.lu_plan import LUPlan, analyse, new_lines
+from gearmbs.dae.linalg.entry_lists import NEGLIGIBLE, NEGLIGIBLE_IN_NEWTON
+from gearmbs.dae.linalg.left_out import signs_of_error
+from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse, new_lines
 from gearmbs.dae.linalg.sparse_lu import LUFactors, new_factors
 from gearmbs.dae.model.evaluator import new_records, pattern
 from gearmbs.dae.problem import INPUT, DAEProblem, Number
 from gearmbs.kernels.bound import NAMES
+from gearmbs.kernels.lanes import LANES
 from gearmbs.mechanism.solve.simulator import Begun
 from gearmbs.native.driver import Driver
 from gearmbs.native.image import CONSTANT, SCRATCH, STATE, Image, Layout, member_of, word_of
@@ -42,7 +47,7 @@ OF_TAIL = (
     "tail_at", "tail_src", "tail_scale", "block_col", "lane_ptr", "act_ptr", "act_to", "act_by", "act_u", "last_ptr",
     "last_to", "part_ptr", "part_at", "part_col", "above_ptr", "above_col", "above_at",
 )  # fmt: skip
-"""Arrays of a plan that no plan made without Python has."""
+"""Arrays of a plan with a dense tail."""
 OF_MATRIX = ("a_pos", "a_src", "a_scale", "a_to", "left_src", "left_limit", "limit")
 OF_FACTORS = ("u_pos", "u_col", "l_pos", "l_col", "l_to", "l_by", "u_to", "u_by", "div_to", "div_by")
 OF_OPERATIONS = ("op_to", "op_l", "op_u")
@@ -75,9 +80,7 @@ class _Factored(NamedTuple):
     rows: int
 
 
-def memory_of(
-    begun: Begun, numbers: Mapping[str, Number], told: list[Told], function: Callable[[Any], int], deforms: bool
-) -> Memory:
+def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], function: Callable[[Any], int]) -> Memory:
     """Lay out the memory of a run.
 
     Parameters
@@ -89,8 +92,6 @@ def memory_of(
         Outputs.
     function : callable
         Returns the number of a kernel by its address in this process, or by its name where the driver calls it.
-    deforms : bool
-        Whether pivots are chosen for all entries.
     """
     run, image = begun.run, Image()
     st = _state(begun)
@@ -100,17 +101,18 @@ def memory_of(
     matrix = run.indptr, run.indices, run.scale, run.counted
     assert run.plan is not None
     assert run.factors is not None
-    own = _factored(image, run.plan, run.factors, *matrix)
-    driver = _driver(begun, numbers, deforms)
+    others, couplings = _other_plans(run), begun.problem.couplings
+    own = _factored(image, run.plan, run.factors, *matrix, others, begun.problem.small_entries, couplings)
+    driver = _driver(begun, numbers)
     parts["driver"] = image.struct(driver, STATE, {"scratch": SCRATCH, **dict.fromkeys(_FIXED, CONSTANT)})
     for kernel in BY_ADDRESS:
         image.function_at(parts["driver"], member_of(Driver, kernel.__name__), function(kernel.__name__))
     asked = expressions_of(begun.system, told)
     teller, plan, indptr, indices = _teller(begun, told, asked)
     ones, counted = np.ones(indptr.size - 1), np.zeros(indices.size)
-    found = _factored(image, plan, new_factors(plan), indptr, indices, ones, counted)
-    others = {**dict.fromkeys(_RECORDS, SCRATCH), **dict.fromkeys(_ASKED, CONSTANT)}
-    parts["teller"] = image.struct(teller, STATE, others)
+    found = _factored(image, plan, new_factors(plan), indptr, indices, ones, counted, [], False, None)
+    kinds = {**dict.fromkeys(_RECORDS, SCRATCH), **dict.fromkeys(_ASKED, CONSTANT)}
+    parts["teller"] = image.struct(teller, STATE, kinds)
     image.function_at(parts["teller"], member_of(Teller, "evaluate"), function("evaluate_rows"))
     if asked.bounds.size:
         image.function_at(parts["teller"], member_of(Teller, "request"), function("eval_request"))
@@ -162,10 +164,29 @@ def _functions(image: Image, problem: DAEProblem, function: Callable[[Any], int]
     return number
 
 
+def _other_plans(run: Run) -> list[LUPlan]:
+    """Return plans for the present matrix of a run whose bodies deform, by what may be left out of it."""
+    st, plans = run.state, []
+    if not run.problem.small_entries:
+        return []
+    for negligible in (*NEGLIGIBLE_IN_NEWTON, NEGLIGIBLE):
+        with contextlib.suppress(SingularMatrixError):
+            counted = np.zeros(len(run.indices), dtype=bool)
+            plans.append(
+                analyse(
+                    run.indptr, run.indices, st.matrix, run.scale, 0.0, counted, negligible, with_tail=True,
+                    couplings=run.problem.couplings,
+                )
+            )  # fmt: skip
+    with contextlib.suppress(SingularMatrixError):
+        plans.append(analyse(run.indptr, run.indices, st.matrix, run.scale, with_tail=True))
+    return plans
+
+
 def _room_for(name: str, n: int, entries: int, present: int) -> int:
-    """Return how long an array of a plan may become."""
+    """Return how long an array of a plan may become; ``present`` is the length of the longest that is known."""
     if name in OF_TAIL:
-        return present
+        return FILL * present
     if name in PER_COLUMN:
         wanted = n + 1
     elif name in OF_MATRIX:
@@ -181,12 +202,13 @@ def _room_for(name: str, n: int, entries: int, present: int) -> int:
 
 def _factored(
     image: Image, plan: LUPlan, factors: LUFactors, indptr: np.ndarray, indices: np.ndarray, scale: np.ndarray,
-    counted: np.ndarray,
+    counted: np.ndarray, others: list[LUPlan], with_tail: bool, couplings: np.ndarray | None,
 ) -> _Factored:  # fmt: skip
-    """Take in a plan and its factors, with room for others of the same matrix."""
+    """Take in a plan and its factors, with room for others of the same matrix, among them some that are known."""
     n, entries = len(indptr) - 1, len(indices)
     members = type(plan).array_members
-    rooms = np.array([_room_for(name, n, entries, getattr(plan, name).size) for name in members], dtype=np.int64)
+    longest = [max(getattr(one, name).size for one in (plan, *others)) for name in members]
+    rooms = np.array([_room_for(name, n, entries, size) for name, size in zip(members, longest)], dtype=np.int64)
     at, sizes = np.zeros(len(members), dtype=np.int64), {"i8": 0, "u4": 0, "f8": 0}
     for k, (kind, _) in enumerate(members.values()):
         at[k] = sizes[kind]
@@ -199,12 +221,18 @@ def _factored(
     for k, (name, (kind, _)) in enumerate(members.items()):
         inside = int(at[k]) * pools[kind].itemsize
         image.address_of(plan_part, word_of(plan, name), image.array(pools[kind], STATE), inside)
-    size = max(2 * FILL * entries + n + 1, factors.lu.size)
-    lu = np.zeros(size)
-    lu[: factors.lu.size] = factors.lu
+    own = {name: getattr(factors, name) for name in type(factors).array_members}
+    known = [factors, *map(new_factors, others)]
+    sizes_of = {
+        name: FILL * max(getattr(one, name).size for one in known) for name in ("blocks", "above", "lower", "rest")
+    }
+    sizes_of |= {"lu": max(2 * FILL * entries + n + 1, factors.lu.size), "x": n + LANES}
+    for name, length in sizes_of.items():
+        larger = np.zeros(length)
+        larger[: own[name].size] = own[name]
+        own[name] = larger
     factors_part = image.record(factors, STATE)
-    for name in type(factors).array_members:
-        array = lu if name == "lu" else getattr(factors, name)
+    for name, array in own.items():
         image.address_of(factors_part, word_of(factors, name), image.array(array, STATE))
     room = PlanRoom(
         words=np.zeros(2 * len(members), dtype=np.int64),
@@ -212,16 +240,18 @@ def _factored(
         head=np.zeros(2, dtype=np.int64),
         at=at,
         room=rooms,
+        factor_room=np.array([array.size for array in own.values()], dtype=np.int64),
+        with_tail=with_tail,
         ints=pools["i8"],
         places=pools["u4"],
         numbers=pools["f8"],
-        lu=lu,
-        x=factors.x,
-        w=factors.w,
+        **{name: own[name] for name in ("lu", "x", "w", "blocks", "above", "lower", "rest")},
         indptr=np.asarray(indptr, dtype=np.int64),
         indices=np.asarray(indices, dtype=np.int64),
         scale=np.asarray(scale, dtype=float),
         counted=np.asarray(counted).astype(np.int64),
+        couplings=np.zeros(0, dtype=np.int64) if couplings is None else couplings.astype(np.int64),
+        signs=signs_of_error(n),
     )
     part = image.record(room, STATE)
     aliases = {
@@ -229,7 +259,7 @@ def _factored(
         "factor_words": (factors_part, word_of(factors, "lu")),
         "head": (plan_part, member_of(LUPlan, "tail")),
     }
-    fixed = ("at", "room", "indptr", "indices", "scale")
+    fixed = ("at", "room", "factor_room", "indptr", "indices", "scale", "couplings", "signs")
     for name in type(room).array_members:
         number, inside = aliases.get(name, (-1, 0))
         if number < 0:
@@ -264,7 +294,7 @@ _ASKED = (
 )  # fmt: skip
 
 
-def _driver(begun: Begun, numbers: Mapping[str, Number], deforms: bool) -> Driver:
+def _driver(begun: Begun, numbers: Mapping[str, Number]) -> Driver:
     """Return what drives the run, which stands at the present point."""
     run, st, point = begun.run, begun.run.state, begun.point
     n, cells, records = begun.problem.n, begun.cells, run.last_records
@@ -290,7 +320,6 @@ def _driver(begun: Begun, numbers: Mapping[str, Number], deforms: bool) -> Drive
         watch_steps=int(st.steps),
         watch_t=float(st.t),
         repivots=run.repivots,
-        deforms=deforms,
         jump_y=np.zeros(n),
         jump_yp=np.zeros(n),
         table=records.table.copy(),

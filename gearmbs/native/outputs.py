@@ -205,6 +205,10 @@ def chosen_outputs(
     finder, named, left = Finder(system, problem, numbers), system.mechanism.outputs, []
     if outputs is None and not named:
         return finder.everything(), []
+    for name in named if outputs is None else outputs:
+        if isinstance(name, str) and name in named:
+            # sensors make their markers, which all expressions count along with theirs
+            _ = named[name].text
     if outputs is not None:
         return [_asked(finder, named, item) for item in outputs], []
     found = []

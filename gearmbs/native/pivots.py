@@ -1,20 +1,26 @@
 """Pivots chosen without Python: the analysis of a sparse matrix, its plan written into room that was made for it.
 
-The pivots are those of `gearmbs.dae.linalg.lu_plan.analyse`, bit for bit, but of mechanisms whose bodies deform: there
-Python also leaves out what the corrector does without, and takes the last pivots as a full block. Here all entries are
-taken, so that what follows agrees within the tolerance alone.
+The pivots, and what is left out of the matrix, are those of `gearmbs.dae.linalg.lu_plan.analyse`, bit for bit.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.driver import DROP_ROUNDS_ALLOWED, DROP_TOLERANCES, SINGULAR_RETRIES
-from gearmbs.dae.linalg.entry_lists import FEWEST_ENTRIES, LEAVING_PLANS, NEGLIGIBLE, STEPS_A_PLAN, entry_lists
+from gearmbs.dae.linalg.entry_lists import (
+    COUPLING_LIMIT,
+    FEWEST_ENTRIES,
+    LEAVING_PLANS,
+    NEGLIGIBLE,
+    NEGLIGIBLE_IN_NEWTON,
+    STEPS_A_PLAN,
+    WHEN_PLANNED,
+)
+from gearmbs.dae.linalg.left_out import converges_without
 from gearmbs.dae.linalg.lu_plan import LUPlan, parity, scale_and_choose
 from gearmbs.dae.linalg.pivoting import CANCELLED
-from gearmbs.dae.linalg.schedule import has_nodes, nodes, operations_in_order
+from gearmbs.dae.linalg.plan_lists import LISTS, lists_of_plan
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor
 from gearmbs.dae.result import Status
 from gearmbs.kernels.jit import njit
@@ -23,6 +29,8 @@ from gearmbs.kernels.pointers import caller
 from gearmbs.kernels.structs import IndexVector, IntVector, Struct, Vector
 
 scale_and_choose_at = caller(scale_and_choose.declared)
+lists_of_plan_at = caller(lists_of_plan.declared)
+converges_without_at = caller(converges_without.declared)
 factor_at = caller(factor.declared)
 
 SINGULAR = int(Status.SINGULAR_JACOBIAN)
@@ -41,7 +49,8 @@ RETRY = 1
     NODE_END, ROW_FROM, COL_TO, ROW_SCALE, COL_SCALE, KEPT, LEFT_SRC, LEFT_LIMIT, LIMIT,
 ) = range(len(LUPlan.array_members))  # fmt: skip
 """Arrays of a plan in their order; each has two words, address and length."""
-LU, _, X, W, BLOCKS, ABOVE, LOWER, REST = range(len(LUFactors.array_members))
+assert LUPlan.array_members.keys() == {*LISTS, "left_src", "left_limit", "limit"}
+LU, _, X, _, BLOCKS, ABOVE, LOWER, REST = range(len(LUFactors.array_members))
 """The same of factors."""
 
 
@@ -56,31 +65,48 @@ class PlanRoom(Struct):
         Scalars of the plan.
     at, room : ndarray of int64, shape (arrays,)
         Where each array begins in the one of the following that has its type, and how long it may become.
+    factor_room : ndarray of int64, shape (arrays of factors,)
+        How long each array of the factors may become.
     ints, places, numbers : ndarray
         Memory of the arrays by their type.
-    lu, x, w : ndarray
-        Memory of factors; the other arrays have their lengths already.
+    lu, x, w, blocks, above, lower, rest : ndarray
+        Memory of factors.
     indptr, indices, scale : ndarray
         As of `gearmbs.dae.linalg.lu_plan.analyse`.
     counted : ndarray of int64
         Entries that have counted in any matrix before.
+    couplings : ndarray of int64
+        As of `gearmbs.dae.linalg.lu_plan.analyse`; empty for none.
+    signs : ndarray
+        Of `gearmbs.dae.linalg.left_out.signs_of_error`.
+    with_tail : bool
+        Whether the last pivots may be taken as a full block.
     """
+
+    with_tail: bool
 
     words: IntVector
     factor_words: IntVector
     head: IntVector
     at: IntVector
     room: IntVector
+    factor_room: IntVector
     ints: IntVector
     places: IndexVector
     numbers: Vector
     lu: Vector
     x: Vector
     w: Vector
+    blocks: Vector
+    above: Vector
+    lower: Vector
+    rest: Vector
     indptr: IntVector
     indices: IntVector
     scale: Vector
     counted: IntVector
+    couplings: IntVector
+    signs: Vector
 
 
 ROOM_TYPE = PlanRoom.numba_type
@@ -98,46 +124,78 @@ def _put(room, k, into, items):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _put_order(room, rank, n, ends, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col):
-    """Write in which order the matrix is factored, as `gearmbs.dae.linalg.schedule` has it; return whether it fits.
+def _put_lists(
+    d, room, with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices
+):
+    """Write all that follows from pivots into the room of a plan; return whether it fits.
 
     Parameters
     ----------
-    room : PlanRoom
-    rank, n : int
-        Proper pivots, and their number with those set aside.
-    ends, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col : ndarray
-        ``node_end`` and others of `gearmbs.dae.linalg.lu_plan.LUPlan`.
+    d, room
+        As of `write_plan`.
+    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices
+        As of `gearmbs.dae.linalg.plan_lists.lists_of_plan`.
     """
-    none, nothing = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.uint32)
-    if has_nodes(ends):
-        fits = _put(room, L_TO, room.places, l_pos) and _put(room, L_BY, room.places, l_col)
-        fits = fits and _put(room, U_TO, room.places, u_pos) and _put(room, U_BY, room.places, u_col)
-        for k in (A_TO, PIVOT_ORDER, OP_TO, OP_L, OP_U, DIV_TO, DIV_BY):
-            _put(room, k, room.places, nothing)
-        for k in (PIVOT_PTR, OP_PTR, DIV_PTR):
-            _put(room, k, room.ints, none)
-        return fits
     (
-        l_to, l_by, u_to, u_by, a_to, pivot_ptr, pivot_order, op_ptr, op_to, op_l, op_u, div_ptr, div_to, div_by, _, _,
-    ) = operations_in_order(rank, n, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col)  # fmt: skip
-    fits = _put(room, L_TO, room.places, l_to) and _put(room, L_BY, room.places, l_by)
-    fits = (
-        fits
-        and _put(room, U_TO, room.places, u_to)
-        and _put(room, U_BY, room.places, u_by)
-        and _put(room, A_TO, room.places, a_to)
-    )
+        tail, u_tail, a_ptr, a_pos, a_src, a_scale, tail_at, tail_src, tail_scale, u_by_col, u_pos, l_by_col, l_pos,
+        u_col, l_col, block_col, lane_ptr, act_ptr, act_to, act_by, act_u, last_ptr, last_to, part_ptr, part_at,
+        part_col, above_ptr, above_col, above_at, l_to, l_by, u_to, u_by, a_to, pivot_ptr, pivot_order, op_ptr, op_to,
+        op_l, op_u, div_ptr, div_to, div_by, node_end, row_from, col_to, row_scale, col_scale, kept,
+    ) = lists_of_plan_at(d.lists_of_plan)(
+        with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices
+    )  # fmt: skip
+    n = rows.shape[0]
+    padded = (n - tail + LANES - 1) // LANES * LANES
+    sizes = np.zeros(room.factor_room.shape[0], dtype=np.int64)
+    sizes[LU], sizes[X] = l_pos.shape[0] + u_pos.shape[0] + n + 1, tail + padded
+    sizes[BLOCKS], sizes[ABOVE] = LANES * block_col.shape[0] + padded * (n - tail), LANES * above_col.shape[0]
+    sizes[LOWER], sizes[REST] = padded * (n - tail) + LANES, padded
+    fits = True
+    for k in range(sizes.shape[0]):
+        fits &= sizes[k] <= room.factor_room[k]
+    fits = fits and _put(room, A_PTR, room.ints, a_ptr) and _put(room, A_POS, room.places, a_pos)
+    fits = fits and _put(room, A_SRC, room.places, a_src) and _put(room, A_SCALE, room.numbers, a_scale)
+    fits = fits and _put(room, TAIL_AT, room.places, tail_at) and _put(room, TAIL_SRC, room.places, tail_src)
+    fits = fits and _put(room, TAIL_SCALE, room.numbers, tail_scale) and _put(room, U_PTR, room.ints, u_by_col)
+    fits = fits and _put(room, U_POS, room.places, u_pos) and _put(room, L_PTR, room.ints, l_by_col)
+    fits = fits and _put(room, L_POS, room.places, l_pos) and _put(room, U_COL, room.places, u_col)
+    fits = fits and _put(room, L_COL, room.places, l_col) and _put(room, BLOCK_COL, room.places, block_col)
+    fits = fits and _put(room, LANE_PTR, room.ints, lane_ptr) and _put(room, ACT_PTR, room.ints, act_ptr)
+    fits = fits and _put(room, ACT_TO, room.places, act_to) and _put(room, ACT_BY, room.places, act_by)
+    fits = fits and _put(room, ACT_U, room.places, act_u) and _put(room, LAST_PTR, room.ints, last_ptr)
+    fits = fits and _put(room, LAST_TO, room.places, last_to) and _put(room, PART_PTR, room.ints, part_ptr)
+    fits = fits and _put(room, PART_AT, room.places, part_at) and _put(room, PART_COL, room.places, part_col)
+    fits = fits and _put(room, ABOVE_PTR, room.ints, above_ptr) and _put(room, ABOVE_COL, room.places, above_col)
+    fits = fits and _put(room, ABOVE_AT, room.places, above_at) and _put(room, L_TO, room.places, l_to)
+    fits = fits and _put(room, L_BY, room.places, l_by) and _put(room, U_TO, room.places, u_to)
+    fits = fits and _put(room, U_BY, room.places, u_by) and _put(room, A_TO, room.places, a_to)
     fits = fits and _put(room, PIVOT_PTR, room.ints, pivot_ptr) and _put(room, PIVOT_ORDER, room.places, pivot_order)
     fits = fits and _put(room, OP_PTR, room.ints, op_ptr) and _put(room, OP_TO, room.places, op_to)
     fits = fits and _put(room, OP_L, room.places, op_l) and _put(room, OP_U, room.places, op_u)
     fits = fits and _put(room, DIV_PTR, room.ints, div_ptr) and _put(room, DIV_TO, room.places, div_to)
-    return fits and _put(room, DIV_BY, room.places, div_by)
+    fits = fits and _put(room, DIV_BY, room.places, div_by) and _put(room, NODE_END, room.ints, node_end)
+    fits = fits and _put(room, ROW_FROM, room.places, row_from) and _put(room, COL_TO, room.places, col_to)
+    fits = fits and _put(room, ROW_SCALE, room.numbers, row_scale) and _put(room, COL_SCALE, room.numbers, col_scale)
+    fits = fits and _put(room, KEPT, room.numbers, kept)
+    if fits:
+        room.head[0], room.head[1] = tail, u_tail
+        for k in (LU, X, BLOCKS, ABOVE, LOWER, REST):
+            room.factor_words[2 * k + 1] = sizes[k]
+        room.lu[:] = 0.0
+        room.x[:] = 0.0
+        room.w[:] = 0.0
+        room.blocks[:] = 0.0
+        room.above[:] = 0.0
+        room.lower[:] = 0.0
+        room.rest[:] = 0.0
+    return fits
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def write_plan(d, room, columns, rows_left, vals, drop, leaves, negligible):
+def write_plan(d, room, columns, rows_left, whole, drop, leaves, keeps, negligible):
     """Choose pivots for a matrix and write their plan, if it is regular or small pivots may be dropped.
+
+    A tail for which there is no room is taken entry by entry.
 
     Parameters
     ----------
@@ -146,10 +204,13 @@ def write_plan(d, room, columns, rows_left, vals, drop, leaves, negligible):
     room : PlanRoom
     columns, rows_left : Lines
         Scratch, see `gearmbs.dae.linalg.pivoting.choose_pivots`.
-    vals, drop, negligible
+    whole : ndarray
+        Values of the matrix.
+    drop, negligible
         As of `gearmbs.dae.linalg.lu_plan.analyse`.
-    leaves : bool
-        Whether entries that have not counted yet may be left out.
+    leaves, keeps : bool
+        Whether entries that have not counted yet may be left out; whether those that count here are to be known from
+        then on.
 
     Returns
     -------
@@ -157,75 +218,67 @@ def write_plan(d, room, columns, rows_left, vals, drop, leaves, negligible):
         Proper pivots, or NO_ROOM.
     """
     n, entries = room.indptr.shape[0] - 1, room.indices.shape[0]
-    counted = np.ones(entries, dtype=np.bool_)
+    counted, spared = np.ones(entries, dtype=np.bool_), np.zeros(entries, dtype=np.bool_)
     if leaves:
         for p in range(entries):
             counted[p] = room.counted[p] != 0
+    spares = room.couplings.shape[0] > 0 and negligible >= NEGLIGIBLE_IN_NEWTON[0]
+    vals = whole.copy()
     while True:
+        if spares:
+            for p in range(entries):
+                spared[p] = room.couplings[p] != 0 and not counted[p]
+                vals[p] = 0.0 if spared[p] else whole[p]
         (
             rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, limits,
         ) = scale_and_choose_at(d.scale_and_choose)(
             room.indptr, room.indices, vals, room.scale, max(drop, CANCELLED), counted, negligible, columns, rows_left
         )  # fmt: skip
-        if leaves:
+        if leaves and keeps:
             for p in range(entries):
                 room.counted[p] = int(counted[p])
         if rank < 0:
             return NO_ROOM
-        if rank == n or left.shape[0] == 0:
+        if rank < n and left.shape[0] > 0:
+            # what was left out may be what was missing
+            counted[:] = True
+            leaves, negligible = False, NEGLIGIBLE
+            continue
+        limit = np.full(entries if left.shape[0] > 0 else 0, np.inf)
+        for e in range(left.shape[0]):
+            limit[left[e]] = limits[e]
+        more = False
+        if spares and left.shape[0] > 0:
+            for p in range(entries):
+                if spared[p]:
+                    limit[p] *= COUPLING_LIMIT / negligible
+                    if abs(whole[p]) > WHEN_PLANNED * limit[p]:
+                        counted[p] = True
+                        more = True
+        if not more:
             break
-        # what was left out may be what was missing
-        counted[:] = True
-        leaves = False
+    if leaves and keeps:
+        for p in range(entries):
+            room.counted[p] = int(counted[p])
     if rank < n and drop == 0.0:
         return rank
-    (
-        a_ptr, a_pos, a_src, a_scale, u_by_col, u_pos, u_col, l_pos, l_col, row_from, col_to, by_row, by_col, kept,
-    ) = entry_lists(
-        rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices
-    )  # fmt: skip
-    ends = nodes(l_ptr, l_pos)
-    size = l_pos.shape[0] + u_pos.shape[0] + n + 1
-    if size > room.lu.shape[0]:
-        return NO_ROOM
-    fits = _put_order(room, rank, n, ends, a_ptr, a_pos, u_by_col, u_pos, u_col, l_ptr, l_pos, l_col)
-    fits = fits and _put(room, A_PTR, room.ints, a_ptr) and _put(room, A_POS, room.places, a_pos)
-    fits = fits and _put(room, A_SRC, room.places, a_src) and _put(room, A_SCALE, room.numbers, a_scale)
-    fits = fits and _put(room, U_PTR, room.ints, u_by_col) and _put(room, U_POS, room.places, u_pos)
-    fits = fits and _put(room, U_COL, room.places, u_col) and _put(room, L_PTR, room.ints, l_ptr)
-    fits = fits and _put(room, L_POS, room.places, l_pos) and _put(room, L_COL, room.places, l_col)
-    fits = fits and _put(room, NODE_END, room.ints, ends)
-    if not fits:
-        return NO_ROOM
-    _put(room, ROW_FROM, room.places, row_from)
-    _put(room, COL_TO, room.places, col_to)
-    _put(room, ROW_SCALE, room.numbers, by_row)
-    _put(room, COL_SCALE, room.numbers, by_col)
-    _put(room, KEPT, room.numbers, kept)
+    fits, with_tail = False, room.with_tail
+    while not fits:
+        fits = _put_lists(
+            d, room, with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr,
+            indices,
+        )  # fmt: skip
+        if not (fits or with_tail):
+            return NO_ROOM
+        with_tail = False
     _put(room, LEFT_SRC, room.places, left)
     _put(room, LEFT_LIMIT, room.numbers, limits)
-    limit = np.full(entries if left.shape[0] > 0 else 0, np.inf)
-    for e in range(left.shape[0]):
-        limit[left[e]] = limits[e]
     _put(room, LIMIT, room.numbers, limit)
-    # no pivots as a full block
-    for k in (TAIL_AT, TAIL_SRC, TAIL_SCALE, BLOCK_COL, LANE_PTR, ACT_PTR, ACT_TO, ACT_BY, ACT_U):
-        room.words[2 * k + 1] = 0
-    for k in (LAST_PTR, LAST_TO, PART_PTR, PART_AT, PART_COL, ABOVE_PTR, ABOVE_COL, ABOVE_AT):
-        room.words[2 * k + 1] = 0
-    room.head[0], room.head[1] = n, 0
-    room.factor_words[2 * LU + 1], room.factor_words[2 * X + 1] = size, n
-    for member in (BLOCKS, ABOVE, REST):
-        room.factor_words[2 * member + 1] = 0
-    room.factor_words[2 * LOWER + 1] = LANES
-    room.lu[:] = 0.0
-    room.x[:] = 0.0
-    room.w[:] = 0.0
     return rank
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def choose_for_run(st, d, room, columns, rows_left):
+def choose_for_run(st, d, room, columns, rows_left, plan, factors):
     """Choose new pivots for the Newton matrix of a run, as `gearmbs.dae.integrators.driver.Run.repivot` does.
 
     Parameters
@@ -235,6 +288,8 @@ def choose_for_run(st, d, room, columns, rows_left):
     d : Driver
     room, columns, rows_left
         As of `write_plan`.
+    plan, factors : LUPlan, LUFactors
+        What stands in the room.
 
     Returns
     -------
@@ -252,44 +307,45 @@ def choose_for_run(st, d, room, columns, rows_left):
             st.h *= 0.6
             return RETRY
         return NOT_FINITE
+    stricter = 0
     while True:
+        negligible = NEGLIGIBLE
+        if st.left_out and stricter < len(NEGLIGIBLE_IN_NEWTON):
+            negligible = NEGLIGIBLE_IN_NEWTON[stricter]
         d.repivots += 1
         drop = DROP_TOLERANCES[st.drop_level]
         fewest = st.drop_level > 0 or st.matrix.shape[0] < FEWEST_ENTRIES
-        leaves = not (d.deforms or fewest or d.repivots > LEAVING_PLANS + st.steps // STEPS_A_PLAN)
-        rank = write_plan(d, room, columns, rows_left, st.matrix, drop, leaves, NEGLIGIBLE)
+        leaves = not (fewest or d.repivots > LEAVING_PLANS + st.steps // STEPS_A_PLAN)
+        # what counts in one matrix does not in all that follow
+        rank = write_plan(d, room, columns, rows_left, st.matrix, drop, leaves, stricter == 0, negligible)
         if rank < 0:
             return rank
-        if rank == n or drop > 0.0:
-            break
-        if st.drop_failed and st.singular_fails < SINGULAR_RETRIES:
-            st.singular_fails += 1
-            st.h *= 0.6
-            st.matrix_wanted = True
-            # whatever pivots there are belong to another attempt
-            st.growth_limit = -1.0
-            return RETRY
-        if not (st.steps > 0 and st.drop_rounds < DROP_ROUNDS_ALLOWED):
-            return SINGULAR
-        st.drop_rounds += 1
-        st.drop_level, st.drop_age = 1, 0
-    if d.deforms:
-        # nothing is left out of it
-        st.left_out = False
-    rows, cols = np.empty(n, dtype=np.uint32), np.empty(n, dtype=np.uint32)
-    for k in range(n):
-        rows[k], cols[k] = room.places[room.at[ROW_FROM] + k], room.places[room.at[COL_TO] + k]
-    st.gamma_planned = st.gamma
-    st.plan_sign = parity(rows) * parity(cols)
-    if st.drop_level == 0:
-        st.drop_rounds = 0
-    return CHOSEN
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def factor_anew(st, d, plan, factors):
-    """Factor the matrix of a run with pivots that have just been chosen, and allow their factors to grow."""
-    growth = factor_at(d.factor)(plan, factors, st.matrix)
-    st.factorizations += 1
-    st.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
-    return s.RUNNING
+        if rank < n and drop == 0.0:
+            if st.drop_failed and st.singular_fails < SINGULAR_RETRIES:
+                st.singular_fails += 1
+                st.h *= 0.6
+                st.matrix_wanted = True
+                # whatever pivots there are belong to another attempt
+                st.growth_limit = -1.0
+                return RETRY
+            if not (st.steps > 0 and st.drop_rounds < DROP_ROUNDS_ALLOWED):
+                return SINGULAR
+            st.drop_rounds += 1
+            st.drop_level, st.drop_age = 1, 0
+            stricter = 0
+            continue
+        rows, cols = np.empty(n, dtype=np.uint32), np.empty(n, dtype=np.uint32)
+        for k in range(n):
+            rows[k], cols[k] = room.places[room.at[ROW_FROM] + k], room.places[room.at[COL_TO] + k]
+        st.gamma_planned = st.gamma
+        st.plan_sign = parity(rows) * parity(cols)
+        if st.drop_level == 0:
+            st.drop_rounds = 0
+        growth = factor_at(d.factor)(plan, factors, st.matrix)
+        st.factorizations += 1
+        st.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
+        if negligible <= NEGLIGIBLE or converges_without_at(d.converges_without)(
+            d.solve, plan, factors, room.indptr, room.indices, st.matrix, room.signs
+        ):
+            return CHOSEN
+        stricter += 1

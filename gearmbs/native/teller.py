@@ -259,13 +259,13 @@ def choose_for_outputs(st, d, q, room, columns, rows_left, plan, factors):
         q.plans += 1
         if q.vals.shape[0] >= FEWEST_ENTRIES and q.plans <= LEAVING_PLANS:
             _assemble(st, d, q, plan, factors, 0.0)
-            rank = write_plan(d, room, columns, rows_left, q.vals, 0.0, True, NEGLIGIBLE)
+            rank = write_plan(d, room, columns, rows_left, q.vals, 0.0, True, True, NEGLIGIBLE)
             if rank < n:
                 return rank if rank < 0 else SINGULAR
             if room.words[2 * LEFT_SRC + 1] > 0:
                 return CHOSEN
     _assemble(st, d, q, plan, factors, GENERIC_TURNS[max(q.attempt, 1) - 1])
-    rank = write_plan(d, room, columns, rows_left, q.vals, 0.0, False, NEGLIGIBLE)
+    rank = write_plan(d, room, columns, rows_left, q.vals, 0.0, False, False, NEGLIGIBLE)
     if rank < n:
         return rank if rank < 0 else SINGULAR
     return CHOSEN

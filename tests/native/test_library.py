@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
-from gearmbs.drivetrain import RollingContactBearing
+from gearmbs.drivetrain import RollingContactBearing, Shaft, Wheel
 from gearmbs.gears import GearSpec, PlanetarySet, planetary_mechanism
 from gearmbs.mechanism import ModelError
-from gearmbs.native import export
+from gearmbs.native import export, memory
+from gearmbs.studies.presets.bench import bench_train
 from gearmbs.studies.run.simulation import case_mechanism
 from tests.drivetrain.support import stage
 from tests.mechanism.test_stepping import flexible_pair, slider_crank, top
@@ -51,7 +52,7 @@ def expected(m, sim, name):
                 return sim.get(what, owner)["xyz".index(rest)]
             place = ("fx", "fy", "fz", "tx", "ty", "tz").index(rest)
             return sim.get(what, owner)[place // 3][place % 3]
-    raise KeyError(name)
+    return sim.get("output", name)
 
 
 def compared(m, library, end, points=1000, changes=(), looks=23, **options):
@@ -71,8 +72,12 @@ def compared(m, library, end, points=1000, changes=(), looks=23, **options):
         told.append(y)
         told_rates.append(yp)
         if k % looks == looks - 1 and t < end:
-            wanted = [expected(m, sim, name) for name in library.output_names]
-            np.testing.assert_array_equal(instance.outputs(), wanted)
+            wanted, outputs = [expected(m, sim, name) for name in library.output_names], instance.outputs()
+            if m.outputs:
+                # expressions among them differ in their last digits
+                np.testing.assert_allclose(outputs, wanted, rtol=1e-12)
+            else:
+                np.testing.assert_array_equal(outputs, wanted)
     result = sim.solution().result
     np.testing.assert_array_equal(told, result.y[1:])
     np.testing.assert_array_equal(told_rates, result.yp[1:])
@@ -105,14 +110,39 @@ def planetary():
     return m, 0.05, {"tol": 1e-6}
 
 
-def rolling():
-    bearings = [
+def ball_bearings():
+    return [
         RollingContactBearing(name=f"{shaft} {k}", shaft=shaft, station=station, rolling="6206", settings={})
         for shaft in ("in", "out")
         for k, station in (("a", 0.02), ("b", 0.08))
     ]
-    train = stage(bearings=bearings, run_up=0.01, running=True)
+
+
+def rolling():
+    train = stage(bearings=ball_bearings(), run_up=0.01, running=True)
     return train.build(), 0.004, {"tol": 1e-7, "rate_scale": train.rate_scale}
+
+
+def flexible():
+    """Shafts with modes: entries that the corrector does without, and last pivots that are a full block."""
+    m, options = flexible_pair()
+    return m, 0.02, options
+
+
+def flexible_on_rolling_bearings():
+    shafts = [Shaft(name=name, length="100 mm", diameter="30 mm", modes=8, elements=6) for name in ("in", "out")]
+    wheels = [
+        Wheel(name=name, shaft=shaft, station=0.05, gear=GearSpec(teeth, "3 mm", name=name, bore_radius="15 mm"))
+        for name, shaft, teeth in (("pinion", "in", 20), ("gear", "out", 60))
+    ]
+    train = stage(shafts=shafts, wheels=wheels, bearings=ball_bearings(), run_up=0.01, running=True)
+    return train.build(), 0.004, {"tol": 1e-7, "rate_scale": train.rate_scale}
+
+
+def bench():
+    """The test bench of the paper's Fig. 2: two pairs, clutch, pump, housing."""
+    train = bench_train("5 MPa")
+    return train.build(), 0.02, {"tol": 1e-6, "rate_scale": train.rate_scale}
 
 
 def tumbling():
@@ -152,16 +182,27 @@ def test_outputs_that_are_expressions(tmp_path):
         np.testing.assert_allclose(instance.outputs(), wanted, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("model", [misaligned, planetary, rolling, tumbling, of_expressions])
+MODELS = [misaligned, planetary, rolling, flexible, flexible_on_rolling_bearings, bench, tumbling, of_expressions]
+
+
+@pytest.mark.parametrize("model", MODELS)
 def test_other_mechanisms(model, tmp_path):
     m, end, options = model()
     made = export(m, tmp_path, t_end=end, processor="native", **options)
     compared(m, Library(made.library), end, **options)
 
 
-def test_bodies_that_deform(tmp_path):
-    """New pivots are others than in Python: the mesh force differs by less than a finer tolerance makes, twice."""
+def test_without_room_for_a_tail(tmp_path, monkeypatch):
+    """Its entries are taken one by one: the mesh force differs by less than a finer tolerance makes, twice."""
     m, options = flexible_pair()
+    room_for = memory._room_for
+
+    def smaller(name, n, entries, present):
+        # as the plan at the export needs it, no more
+        return present if name in memory.OF_TAIL else room_for(name, n, entries, present)
+
+    monkeypatch.setattr(memory, "_room_for", smaller)
+    monkeypatch.setattr(memory, "_other_plans", lambda run: [])
     asked = [("load", "mesh", component) for component in ("fx", "fy")]
     instance = Instance(Library(export(m, tmp_path, t_end=0.02, outputs=asked, processor="native", **options).library))
     finer = {**options, "tol": 0.1 * options["tol"]}
@@ -174,6 +215,7 @@ def test_bodies_that_deform(tmp_path):
             sim.advance(t)
             told[-1].append(sim.get("load", "mesh")[0][:2])
     library, own, fine = np.array(told).swapaxes(0, 1)
+    assert (library != own).any()
     assert np.abs(library - own).max() <= 2.0 * np.abs(fine - own).max()
     assert np.abs(fine - own).max() <= 0.02 * np.abs(own).max()
 

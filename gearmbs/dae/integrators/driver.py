@@ -30,15 +30,15 @@ from gearmbs.dae.linalg.entry_lists import (
     LEAVING_PLANS,
     NEGLIGIBLE,
     NEGLIGIBLE_IN_NEWTON,
-    RATE_ALLOWED,
     STEPS_A_PLAN,
 )
+from gearmbs.dae.linalg.left_out import converges_without, signs_of_error
 from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse, lines_for, parity
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 from gearmbs.kernels.bound import trying
-from gearmbs.kernels.pointers import bind, direct, no_events, no_hook
+from gearmbs.kernels.pointers import address, bind, direct, no_events, no_hook
 
 FIRST_CHUNK = 16
 """Accepted steps, so that the first Ctrl-C is heeded within a second where a step takes 60 ms."""
@@ -159,35 +159,12 @@ class Run:
         growth = direct(factor)(self.plan, self.factors, st.matrix)
         st.factorizations += 1
         st.growth_limit = max(GROWTH_LIMIT, 100.0 * growth)
-        if negligible > NEGLIGIBLE and not self._converges_without(self.plan, self.factors):
-            return self.repivot(stricter + 1)
+        if negligible > NEGLIGIBLE:
+            solving = address(solve, solve.declared)
+            matrix, signs = (self.indptr, self.indices, st.matrix), signs_of_error(problem.n)
+            if not direct(converges_without)(solving, self.plan, self.factors, *matrix, signs):
+                return self.repivot(stricter + 1)
         return None
-
-    def _converges_without(self, plan: LUPlan, factors: LUFactors) -> bool:
-        """Return whether the corrector converges as well without the entries that a plan leaves out.
-
-        Of an error e of the unknowns it leaves M^-1 (M - A) e, here of one with equal parts of all scaled unknowns: an
-        improbable one, of which the first correction may leave more than the second does of a later one.
-        """
-        left = plan.left_src
-        if left.size == 0:
-            return True
-        columns = np.searchsorted(self.indptr, left, side="right") - 1
-        scale = np.empty(self.problem.n)
-        scale[plan.col_to] = plan.col_scale
-        error = np.random.default_rng(0).choice([-1.0, 1.0], self.problem.n) * scale
-        before = 1.0
-        for _ in range(2):
-            res = np.zeros(self.problem.n)
-            np.add.at(res, self.indices[left], self.state.matrix[left] * error[columns])
-            direct(solve)(plan, factors, res, error)
-            size = float(np.abs(error / scale).max())
-            if size <= RATE_ALLOWED * before:
-                return True
-            if not size <= before:
-                return False
-            before = size
-        return False
 
     def _entries_to_leave(self) -> np.ndarray | None:
         """Return which entries of the matrix have counted so far, if the others may be left out of a plan."""

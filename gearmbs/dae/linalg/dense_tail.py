@@ -9,21 +9,12 @@ other has its entries, so that lanes in which a diagonal lies are treated like a
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import float64, int64, types, uint32
 
-from gearmbs.dae.linalg.schedule import bounds_of, earliest_times, sorted_by, taken_in_order
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES, all_lanes, bits_of, double_of, lanes_at, larger_number, magnitude, put_lanes
 from gearmbs.kernels.structs import vector_at
-
-SHARE = 0.6
-"""Share of entries among the last pivots from which on they are taken as a block: an entry of a list takes several
-times as long as one of a block."""
-SMALLEST = 24
-"""Pivots that are worth a block."""
 
 BELOW = np.tril(np.ones((LANES, LANES)), -1).T.ravel()
 """For each row of a lane ones in the rows below it; the same above."""
@@ -36,32 +27,6 @@ _IVEC = int64[::1]
 def padded(size: int) -> int:
     """Return a number of rows filled up to whole lanes."""
     return -(-size // LANES) * LANES
-
-
-@njit(int64(int64, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")
-def tail_of_plan(rank, l_ptr, u_ptr):
-    """Return the first pivot of the dense tail, or the number of pivots if there is none.
-
-    Parameters
-    ----------
-    rank : int
-        Proper pivots; where some are missing there is no tail.
-    l_ptr, u_ptr : ndarray
-        Where the entries below and right of each pivot begin.
-    """
-    n = l_ptr.shape[0] - 1
-    if rank < n:
-        return n
-    for k in range(n - SMALLEST + 1):
-        size = n - k
-        if l_ptr[n] - l_ptr[k] + u_ptr[n] - u_ptr[k] >= SHARE * size * (size - 1):
-            return k
-    return n
-
-
-def without_tail(tail: int, ptr: np.ndarray, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the entries below or right of each pivot without those of the tail's pivots."""
-    return np.minimum(ptr, ptr[tail]), items[: ptr[tail]]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
@@ -217,171 +182,11 @@ def solve_tail(tail, lower, upper, pivot_inv, rest, x):
         x[tail + i] = rest[i]
 
 
-# Blocks of eight rows: what the pivots before a dense tail give to its rows, C U_F^-1 of a sparse LU.
-#
-# The entries of a column of L in the tail's rows lie close together, as the modes of a body do. Kept in whole lanes,
-# with zeros where there are none, one operation does for as many of them as a lane has, whether they are eliminated
-# with from other columns or from a right-hand side.
-#
-# The blocks stand one after the other, by lanes of rows and then by columns, and behind them the tail's own block. As
-# the operations on single numbers, see `gearmbs.dae.linalg.schedule`, those on blocks are listed step by step, and
-# within a step by how many there are before on the same block.
+# Blocks of eight rows: what the pivots before a dense tail give to its rows, C U_F^-1 of a sparse LU. Where they stand,
+# and what is done with them, is listed by `gearmbs.dae.linalg.front_blocks`.
 
 
 _UVEC = uint32[::1]
-
-
-class FrontBlocks(NamedTuple):
-    """Where the blocks of a plan are.
-
-    Attributes
-    ----------
-    keys : ndarray of int
-        Lane of rows times the number of columns, and the column, of each block in the order in which they stand.
-    ptr, at, lane : ndarray
-        For each column its blocks: their places, and which eight rows of the tail they are.
-    """
-
-    keys: np.ndarray
-    ptr: np.ndarray
-    at: np.ndarray
-    lane: np.ndarray
-
-
-def front_blocks(tail: int, l_ptr: np.ndarray, l_pos: np.ndarray) -> tuple[dict[str, np.ndarray], FrontBlocks]:
-    """Part the rows below each pivot into those before the tail and blocks of the tail's rows.
-
-    Parameters
-    ----------
-    tail : int
-        First pivot of the tail.
-    l_ptr, l_pos : ndarray
-        For each column the rows below the pivot.
-
-    Returns
-    -------
-    fields : dict
-        ``l_ptr``, ``l_pos``, ``l_col``, ``block_col`` and ``lane_ptr`` of `gearmbs.dae.linalg.lu_plan.LUPlan`.
-    blocks : FrontBlocks
-    """
-    n = len(l_ptr) - 1
-    columns, inside = np.repeat(np.arange(n), np.diff(l_ptr)), l_pos >= tail
-    keys = np.unique((l_pos[inside].astype(np.int64) - tail) // LANES * n + columns[inside])
-    lane, column = np.divmod(keys, n)
-    by_column = np.argsort(column, kind="stable")
-    fields = {
-        "l_ptr": np.searchsorted(columns[~inside], np.arange(n + 1)),
-        "l_pos": l_pos[~inside],
-        "l_col": columns[~inside].astype(np.uint32),
-        "block_col": column.astype(np.uint32),
-        "lane_ptr": np.searchsorted(lane, np.arange(-(-(n - tail) // LANES) + 1)),
-    }
-    ptr = np.searchsorted(column[by_column], np.arange(n + 1))
-    return fields, FrontBlocks(keys, ptr, by_column, lane[by_column])
-
-
-def entries_in_blocks(
-    tail: int, keys: np.ndarray, a_ptr: np.ndarray, a_pos: np.ndarray, a_src: np.ndarray, a_scale: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Part the entries of the matrix into those in the tail's rows and all others.
-
-    Parameters
-    ----------
-    keys : ndarray
-        Of `FrontBlocks`.
-    tail, a_ptr, a_pos, a_src, a_scale
-        Of `gearmbs.dae.linalg.lu_plan.LUPlan`, with all entries.
-
-    Returns
-    -------
-    dict
-        The fields ``a_ptr``, ``a_pos``, ``a_src``, ``a_scale``, ``tail_at``, ``tail_src`` and ``tail_scale``.
-    """
-    n = len(a_ptr) - 1
-    columns = np.repeat(np.arange(n), np.diff(a_ptr))
-    inside = a_pos >= tail
-    column, row = columns[inside], a_pos[inside].astype(np.int64) - tail
-    block = np.searchsorted(keys, row // LANES * n + column)
-    of_tail = LANES * len(keys) + (column - tail) * padded(n - tail) + row
-    at = np.where(column < tail, LANES * block + row % LANES, of_tail)
-    return {
-        "a_ptr": np.searchsorted(columns[~inside], np.arange(n + 1)), "a_pos": a_pos[~inside],
-        "a_src": a_src[~inside], "a_scale": a_scale[~inside], "tail_at": at.astype(np.uint32),
-        "tail_src": a_src[inside], "tail_scale": a_scale[inside],
-    }  # fmt: skip
-
-
-@njit(
-    types.Tuple((_IVEC, _UVEC, _UVEC, _UVEC))(int64, _IVEC, _IVEC, _UVEC, _IVEC, _IVEC, _IVEC, _IVEC),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-)
-def _actions(tail, step, u_ptr, u_pos, u_at, block_ptr, block_at, block_lane):
-    """Return where the operations of each step begin, and the blocks ``to`` and ``by`` and the entry of U of each.
-
-    Parameters
-    ----------
-    tail, step, u_ptr, u_pos, u_at
-        As of `operations_on_blocks`.
-    block_ptr, block_at, block_lane : ndarray of int
-        Of `FrontBlocks`.
-    """
-    n = step.shape[0]
-    lanes = (n - tail + LANES - 1) // LANES
-    blocks = block_at.shape[0]
-    count = 0
-    for p in range(u_pos.shape[0]):
-        count += block_ptr[u_pos[p] + 1] - block_ptr[u_pos[p]]
-    steps, at = np.empty(count, dtype=np.int64), np.empty(lanes, dtype=np.int64)
-    to, by, u = np.empty(count, dtype=np.uint32), np.empty(count, dtype=np.uint32), np.empty(count, dtype=np.uint32)
-    e = 0
-    for k in range(n):
-        for b in range(lanes):
-            at[b] = blocks + lanes * (k - tail) + b
-        for q in range(block_ptr[k], block_ptr[k + 1]):
-            at[block_lane[q]] = block_at[q]
-        for p in range(u_ptr[k], u_ptr[k + 1]):
-            j = u_pos[p]
-            for q in range(block_ptr[j], block_ptr[j + 1]):
-                steps[e], to[e], by[e], u[e] = step[k], at[block_lane[q]], block_at[q], u_at[p]
-                e += 1
-    order = sorted_by(earliest_times(to, to, blocks + lanes * (n - tail)))
-    order = order[sorted_by(steps[order])]
-    bounds = bounds_of(steps, count, step[n - 1] + 1)
-    return bounds, taken_in_order(to, order), taken_in_order(by, order), taken_in_order(u, order)
-
-
-def operations_on_blocks(
-    tail: int, step: np.ndarray, u_ptr: np.ndarray, u_pos: np.ndarray, u_at: np.ndarray, blocks: FrontBlocks
-) -> dict[str, np.ndarray]:
-    """Return the fields of a `gearmbs.dae.linalg.lu_plan.LUPlan` that say what is done with blocks, and when.
-
-    Parameters
-    ----------
-    tail, u_ptr, u_pos
-        See there.
-    step : ndarray of int, shape (n,)
-        Step in which each column is eliminated; those of the tail are in one, the last.
-    u_at : ndarray of int
-        Where the entries of U stand among the numbers of the factors.
-    blocks : FrontBlocks
-    """
-    act_ptr, act_to, act_by, act_u = _actions(tail, step, u_ptr, u_pos, u_at, blocks.ptr, blocks.at, blocks.lane)
-    # the last step's wait for nothing: those on a block stand together
-    first = act_ptr[-2]
-    together = first + np.argsort(act_to[first:], kind="stable")
-    for items in (act_to, act_by, act_u):
-        items[first:] = items[together]
-    last_to, last_ptr = np.unique(act_to[first:], return_index=True)
-    columns = np.repeat(np.arange(len(step)), np.diff(blocks.ptr))
-    order = np.argsort(step[columns], kind="stable")
-    return {
-        "act_ptr": act_ptr, "act_to": act_to, "act_by": act_by, "act_u": act_u,
-        "last_to": last_to, "last_ptr": first + np.append(last_ptr, len(act_to) - first),
-        "part_ptr": np.searchsorted(step[columns][order], np.arange(len(act_ptr))),
-        "part_at": blocks.at[order].astype(np.uint32), "part_col": columns[order].astype(np.uint32),
-    }  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -532,26 +337,6 @@ def open_tail(tail, lane_ptr, block_col, blocks, x, rest):
 
 
 # Blocks of eight rows of U before the tail, in the tail's columns: what the tail's unknowns give to those before them.
-
-
-def blocks_above(tail: int, n: int, u_to: np.ndarray, u_by: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the fields ``above_ptr``, ``above_col`` and ``above_at`` of a `gearmbs.dae.linalg.lu_plan.LUPlan`.
-
-    Parameters
-    ----------
-    tail, n : int
-        First pivot of the tail; pivots.
-    u_to, u_by : ndarray
-        Rows and columns of the entries of U, see there.
-    """
-    inside = u_by >= tail
-    row, column = u_to[inside].astype(np.int64), u_by[inside].astype(np.int64)
-    keys, block = np.unique(row // LANES * n + column, return_inverse=True)
-    return {
-        "above_ptr": np.searchsorted(keys // n, np.arange(padded(tail) // LANES + 1)),
-        "above_col": (keys % n).astype(np.uint32),
-        "above_at": (LANES * block + row % LANES).astype(np.uint32),
-    }
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)

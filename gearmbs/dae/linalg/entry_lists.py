@@ -8,13 +8,6 @@ from numba import boolean, float64, int64, types, uint32
 from gearmbs.dae.linalg.pivoting import equilibrate
 from gearmbs.kernels.jit import njit
 
-FIELDS_BY_COLUMNS = (
-    "a_ptr", "a_pos", "a_src", "a_scale", "u_ptr", "u_pos", "u_col", "l_pos", "l_col", "row_from", "col_to",
-    "row_scale", "col_scale", "kept",
-)  # fmt: skip
-"""Fields of a plan in the order in which `entry_lists` returns them."""
-L_POS = FIELDS_BY_COLUMNS.index("l_pos")
-
 _VEC = float64[::1]
 _IVEC = int64[::1]
 _UVEC = uint32[::1]
@@ -136,8 +129,8 @@ def entry_lists(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_s
 
     Returns
     -------
-    fields : tuple of ndarray
-        `FIELDS_BY_COLUMNS`, see `gearmbs.dae.linalg.lu_plan.LUPlan`.
+    a_ptr, a_pos, a_src, a_scale, u_ptr, u_pos, u_col, l_pos, l_col, row_from, col_to, row_scale, col_scale, kept
+        Fields of a `gearmbs.dae.linalg.lu_plan.LUPlan`.
     """
     n = rows.shape[0]
     row_place, col_place = places_of(rows), places_of(cols)

@@ -8,49 +8,24 @@ from typing import NamedTuple
 import numpy as np
 from numba import boolean, float64, int64, types, uint32
 
-from gearmbs.dae.linalg.dense_tail import (
-    blocks_above,
-    entries_in_blocks,
-    front_blocks,
-    operations_on_blocks,
-    tail_of_plan,
-    without_tail,
-)
 from gearmbs.dae.linalg.entry_lists import (
     COUPLING_LIMIT,
-    FIELDS_BY_COLUMNS,
-    L_POS,
     NEGLIGIBLE,
     NEGLIGIBLE_IN_NEWTON,
     WHEN_PLANNED,
-    entry_lists,
     limits,
     part_entries,
     scaled_entries,
     taken_pattern,
 )
 from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, LINES_TYPE, THRESHOLDS, Lines, choose_pivots
-from gearmbs.dae.linalg.schedule import column_by_column, has_nodes, nodes, schedule
+from gearmbs.dae.linalg.plan_lists import LISTS, lists_of_plan
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import direct
 from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, IndexVector, IntVector, Struct, Vector
 
 KNOWN = 16
 """Choices of pivots whose plans are kept; those of the largest models take some megabytes each."""
-
-MOSTLY_NODES = 0.5
-"""Share of L in nodes from which on a matrix with a tail is factored column by column. Of two shafts with 112
-modes each a tenth is, and 67 us by levels compare with 240; of ten blocks of 40 all is, and 73 with 556."""
-
-NO_TAIL = {
-    **dict.fromkeys(
-        "tail_at tail_src block_col act_to act_by act_u last_to part_at part_col above_col above_at".split(),
-        np.zeros(0, dtype=np.uint32),
-    ),
-    **dict.fromkeys(("lane_ptr", "act_ptr", "last_ptr", "part_ptr", "above_ptr"), np.zeros(0, dtype=np.int64)),
-    "tail_scale": np.zeros(0),
-}
-"""Fields of a plan without a dense tail."""
 
 
 class LUPlan(Struct):
@@ -214,38 +189,14 @@ def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     """Return the plan that follows from pivots, the same object for the same ones."""
     with_tail, rank = pivots.with_tail, pivots.rank
     rows, cols, l_ptr, l_rows, u_ptr, u_cols, taken, indptr, indices, left = pivots.lists
-    ones = np.ones(len(rows))
-    tail = tail_of_plan(rank, l_ptr, u_ptr) if with_tail else len(rows)
-    if tail < len(rows):
-        l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
-        u_ptr, u_cols = without_tail(tail, u_ptr, u_cols)
-    lists = direct(entry_lists)(rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices)
-    f = dict(zip(FIELDS_BY_COLUMNS, lists, strict=True), l_ptr=l_ptr, node_end=direct(nodes)(l_ptr, lists[L_POS]))
-    n, blocks = len(rows), None
-    if tail < n:
-        fields, blocks = front_blocks(tail, l_ptr, f["l_pos"])
-        f |= fields | entries_in_blocks(tail, blocks.keys, f["a_ptr"], f["a_pos"], f["a_src"], f["a_scale"])
-        f["node_end"] = direct(nodes)(f["l_ptr"], f["l_pos"])
-        in_nodes = f["node_end"] > np.arange(1, n + 1)
-        if np.diff(f["l_ptr"])[in_nodes].sum() < MOSTLY_NODES * len(f["l_pos"]):
-            # column by column all others would act on the tail one after the other, too
-            f["node_end"] = np.arange(1, n + 1)
-    if direct(has_nodes)(f["node_end"]):
-        order, step, u_at = column_by_column(tail, f["u_pos"], f["u_col"], f["l_pos"], f["l_col"], n)
-    else:
-        order, step, u_at = schedule(
-            rank, tail, f["a_ptr"], f["a_pos"], f["u_ptr"], f["u_pos"], f["u_col"], f["l_ptr"], f["l_pos"], f["l_col"]
-        )
-    if blocks is None:
-        f |= NO_TAIL
-    else:
-        f |= operations_on_blocks(tail, step, f["u_ptr"], f["u_pos"], u_at, blocks)
-    none, u_tail = np.empty(0), np.count_nonzero(f["u_col"] >= tail)
-    if blocks is not None:
-        f |= blocks_above(tail, n, order["u_to"], order["u_by"])
+    ones, none = np.ones(len(rows)), np.empty(0)
+    tail, u_tail, *lists = direct(lists_of_plan)(
+        with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices
+    )
+    f = dict(zip(LISTS, lists, strict=True))
     of_a = _rows_and_columns(f["a_src"], taken, indptr, indices)
     of_tail = _rows_and_columns(f["tail_src"], taken, indptr, indices)
-    plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, u_tail=u_tail, **f, **order)
+    plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, u_tail=u_tail, **f)
     return _Unscaled(plan, of_a, of_tail, (rows, cols))
 
 
@@ -437,7 +388,8 @@ def analyse(
             break
         columns, rows = new_lines(n, 2 * len(columns.pool))
     if rank < n and not counted.all():
-        return analyse(indptr, indices, vals, scale, drop, with_tail=with_tail)
+        # what was left out may be what was missing
+        return analyse(indptr, indices, whole, scale, drop, with_tail=with_tail)
     if rank < n and drop == 0.0:
         rows, cols = chosen[:2]
         raise SingularMatrixError(rows[rank:], cols[rank:])

@@ -273,12 +273,23 @@ def _orders_of_substitution(n, tail, order, u_pos, u_col):
     error_model="numpy",
 )
 def operations_in_order(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col):
-    """Return what `schedule` returns, in its order.
+    """Return in which order a matrix without nodes is factored, from what is done column by column.
 
     Parameters
     ----------
-    rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col
-        See there.
+    rank : int
+        Proper pivots.
+    tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col
+        See `gearmbs.dae.linalg.lu_plan.LUPlan`; without what is in the rows of a tail.
+
+    Returns
+    -------
+    l_to, l_by, u_to, u_by, a_to, pivot_ptr, pivot_order, op_ptr, op_to, op_l, op_u, div_ptr, div_to, div_by : ndarray
+        Fields of a plan.
+    step : ndarray of int64, shape (n,)
+        Level of each column.
+    u_at : ndarray of int64
+        Where the entries of U stand among the numbers of the factors.
     """
     n = l_ptr.shape[0] - 1
     below, above = l_pos.shape[0], u_pos.shape[0]
@@ -324,58 +335,3 @@ def operations_in_order(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_
         level,
         u_at,
     )
-
-
-FIELDS = (
-    "l_to", "l_by", "u_to", "u_by", "a_to", "pivot_ptr", "pivot_order", "op_ptr", "op_to", "op_l", "op_u", "div_ptr",
-    "div_to", "div_by",
-)  # fmt: skip
-STEP, U_AT = len(FIELDS), len(FIELDS) + 1
-"""Behind these in what `operations_in_order` returns."""
-
-
-def schedule(
-    rank: int,
-    tail: int,
-    a_ptr: np.ndarray,
-    a_pos: np.ndarray,
-    u_ptr: np.ndarray,
-    u_pos: np.ndarray,
-    u_col: np.ndarray,
-    l_ptr: np.ndarray,
-    l_pos: np.ndarray,
-    l_col: np.ndarray,
-) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
-    """Return in which order a matrix without nodes is factored, from what is done column by column.
-
-    Parameters
-    ----------
-    rank : int
-        Proper pivots.
-    tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col
-        See `gearmbs.dae.linalg.lu_plan.LUPlan`; without what is in the rows of a tail.
-
-    Returns
-    -------
-    fields : dict
-        Of a plan.
-    step : ndarray of int, shape (n,)
-        Level of each column.
-    u_at : ndarray of int
-        Where the entries of U stand among the numbers of the factors.
-    """
-    found = operations_in_order(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_pos, l_col)
-    return dict(zip(FIELDS, found[:STEP], strict=True)), found[STEP], found[U_AT]
-
-
-def column_by_column(
-    tail: int, u_pos: np.ndarray, u_col: np.ndarray, l_pos: np.ndarray, l_col: np.ndarray, n: int
-) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
-    """Return the same for a matrix with nodes, whose factors stand as its n columns do, each a level of its own."""
-    none, no_bounds = np.empty(0, dtype=np.uint32), np.empty(0, dtype=np.int64)
-    empty = dict.fromkeys(("a_to", "pivot_order", "op_to", "op_l", "op_u", "div_to", "div_by"), none)
-    fields = {
-        "l_to": l_pos, "l_by": l_col, "u_to": u_pos, "u_by": u_col, **empty,
-        **dict.fromkeys(("pivot_ptr", "op_ptr", "div_ptr"), no_bounds),
-    }  # fmt: skip
-    return fields, np.minimum(np.arange(n), tail), len(l_pos) + np.arange(len(u_pos))

@@ -87,7 +87,12 @@ gearmbs_instance *gearmbs_create(void) {
     made->allocated = room;
     made->memory = (unsigned char *)room + (LINE - (uintptr_t)room % LINE) % LINE;
     made->failure = GEARMBS_OK;
-    memcpy(made->memory, gearmbs_block, (size_t)model->block);
+    const unsigned char *from = gearmbs_block;
+    for (int64_t k = 0; k < model->piece_count; k++) {
+        size_t bytes = (size_t)(model->pieces[2 * k + 1] - model->pieces[2 * k]);
+        memcpy(made->memory + model->pieces[2 * k], from, bytes);
+        from += bytes;
+    }
     put_addresses(made->memory, model->block);
     return made;
 }
@@ -145,11 +150,9 @@ static int go(gearmbs_instance *i, double t) {
             return GEARMBS_KERNEL_FAILED;
         if (code != REPIVOT) return code == REACHED ? GEARMBS_OK : (int)code;
         if (gearmbs_choose_for_run(&code, &error, run, driver, at(i, model->room), at(i, model->columns),
-                                   at(i, model->rows)))
+                                   at(i, model->rows), plan, factors))
             return GEARMBS_KERNEL_FAILED;
         if (code < 0) return (int)code;
-        if (code == CHOSEN && gearmbs_factor_anew(&code, &error, run, driver, plan, factors))
-            return GEARMBS_KERNEL_FAILED;
     }
 }
 

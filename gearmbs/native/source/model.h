@@ -9,6 +9,8 @@ typedef struct {
     const char *name, *digest, *token;         /* digest: of the memory, 16 characters; token: of all */
     double t_start, t_end;
     int64_t block, state, size;                /* bytes: of what is given, of a state, of an instance */
+    int64_t piece_count;
+    const int64_t *pieces;                     /* pairs: beginning and end of what is not zero of what is given */
     int64_t inside_count, function_count;
     const int64_t *inside;                     /* where offsets become addresses */
     const int64_t *functions;                  /* pairs: where functions stand, and which */
@@ -37,8 +39,7 @@ int gearmbs_apply(int64_t *changes, void **error, void *bound, void *run, void *
                   int64_t shows);
 int gearmbs_present_value(double *value, void **error, void *run, void *driver, int64_t number);
 int gearmbs_choose_for_run(int64_t *code, void **error, void *run, void *driver, void *room, void *columns,
-                           void *rows);
-int gearmbs_factor_anew(int64_t *code, void **error, void *run, void *driver, void *plan, void *factors);
+                           void *rows, void *plan, void *factors);
 int gearmbs_tell(int64_t *code, void **error, void *run, void *driver, void *teller, void *plan, void *factors,
                  int64_t first);
 int gearmbs_choose_for_outputs(int64_t *code, void **error, void *run, void *driver, void *teller, void *room,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gearmbs.dae.linalg.dense_tail import SMALLEST
+from gearmbs.dae.linalg.front_blocks import SMALLEST
 from gearmbs.dae.linalg.lu_plan import analyse
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors, solve, solve_pair
 

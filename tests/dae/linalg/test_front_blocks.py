@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gearmbs.dae.linalg.dense_tail import front_blocks
+from gearmbs.dae.linalg.front_blocks import front_blocks
 from gearmbs.dae.linalg.lu_plan import analyse
 from gearmbs.dae.linalg.schedule import has_nodes
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors, solve
@@ -18,17 +18,18 @@ def test_rows_below_pivots_are_in_lists_or_blocks(tail):
     below = [np.sort(rng.choice(np.arange(k + 1, n), min(k % 7, n - 1 - k), replace=False)) for k in range(n)]
     below = [rows if k < tail else rows[:0] for k, rows in enumerate(below)]
     l_ptr = np.concatenate(([0], np.cumsum([len(rows) for rows in below])))
-    fields, blocks = front_blocks(tail, l_ptr, np.concatenate(below).astype(np.uint32))
-    ptr = fields["l_ptr"]
-    places = np.arange(len(fields["block_col"]))
+    ptr, l_pos, _, block_col, lane_ptr, first, at_of, lane_of = front_blocks(
+        tail, l_ptr, np.concatenate(below).astype(np.uint32)
+    )
+    places = np.arange(len(block_col))
     for k, rows in enumerate(below):
-        np.testing.assert_array_equal(fields["l_pos"][ptr[k] : ptr[k + 1]], rows[rows < tail])
-        own = slice(blocks.ptr[k], blocks.ptr[k + 1])
-        at, lane = blocks.at[own], blocks.lane[own]
+        np.testing.assert_array_equal(l_pos[ptr[k] : ptr[k + 1]], rows[rows < tail])
+        own = slice(first[k], first[k + 1])
+        at, lane = at_of[own], lane_of[own]
         np.testing.assert_array_equal(lane, np.unique((rows[rows >= tail] - tail) // LANES))
-        np.testing.assert_array_equal(fields["block_col"][at], k)
-        np.testing.assert_array_equal(np.searchsorted(fields["lane_ptr"], at, side="right") - 1, lane)
-    np.testing.assert_array_equal(np.sort(blocks.at), places)
+        np.testing.assert_array_equal(block_col[at], k)
+        np.testing.assert_array_equal(np.searchsorted(lane_ptr, at, side="right") - 1, lane)
+    np.testing.assert_array_equal(np.sort(at_of), places)
 
 
 def blocks_and_border(count: int, size: int, border: int) -> sp.csc_array:

@@ -330,6 +330,19 @@ def test_what_only_rounding_keeps_from_being_singular_is_not_left_out():
         analyse(indptr, indices, vals, np.ones(3), counted=np.zeros(9, dtype=bool))
 
 
+def test_couplings_that_a_matrix_is_singular_without_are_taken():
+    a = np.diag([2.0, 0.0, 0.0, 3.0])
+    a[1, 2] = a[2, 1] = 0.2
+    indptr, indices, vals = csc(np.ones((4, 4)))
+    vals = a.T.ravel()
+    coupled = vals == 0.2
+    plan = analyse(indptr, indices, vals, np.ones(4), 0.0, np.zeros(16, dtype=bool), 1e-4, couplings=coupled)
+    factors, x = new_factors(plan), np.empty(4)
+    assert factor(plan, factors, vals) < GROWTH_LIMIT
+    solve(plan, factors, np.array([2.0, 0.4, 0.6, 3.0]), x)
+    np.testing.assert_allclose(x, [1.0, 3.0, 2.0, 1.0], rtol=1e-14)
+
+
 @pytest.mark.parametrize("with_tail", [False, True])
 def test_lists_of_a_plan_are_made_once_for_the_same_pivots_and_scales_for_each_matrix(with_tail):
     n, rng = 40, np.random.default_rng(3)
