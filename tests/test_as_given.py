@@ -169,8 +169,6 @@ def test_a_speed_in_hertz_that_looks_like_rpm_is_remarked(recwarn):
         (lambda: gm.GearSpec(20, "2 mm", helix_angle=15), "plain numbers: rad; write '15 deg'"),
         (lambda: gm.planetary((19, 17, 56), "2 mm", planet=3), says("'planet'", "planets")),
         (lambda: run_case({"name": "x"}), says("dict", "make_case")),
-        (lambda: make_case({"gears": {"internal": True}}), says("internal", "GearSpec")),
-        (lambda: make_case({"gears": {"helix_angle": "15 deg"}}), says("internal", "helical wheels")),
         (lambda: make_case({"operation": {"duration": -1}}), says("10000 s", "give 1e-05")),
         (lambda: case_mechanism(Case(), "6206", spall=1), says("'spall'", "defects")),
     ],

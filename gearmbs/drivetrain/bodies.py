@@ -67,11 +67,11 @@ def shaft_seats(train: Drivetrain, shaft: Shaft) -> dict[str, float]:
     return {", ".join(names): z for names, z in groups}
 
 
-def shaft_model(train: Drivetrain, shaft: Shaft) -> ModalModel:
-    """Return a shaft with its wheels as a body with modes."""
+def shaft_model(train: Drivetrain, shaft: Shaft, *, bare: bool = False) -> ModalModel:
+    """Return a shaft with its wheels, or ``bare``, as a body with modes."""
     discs = [
         Disc(one.station, mass=one.mass, polar=one.inertia[2], diametral=one.inertia[0], name=one.name)
-        for one in carried(train, shaft.name)
+        for one in ([] if bare else carried(train, shaft.name))
     ]
     with errors_named(shaft.label):
         whole = SectionedShaft(

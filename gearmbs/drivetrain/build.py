@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import combinations, pairwise
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from gearmbs.drivetrain.bodies import ring_seats
+from gearmbs.drivetrain.bodies import ring_seats, shaft_model
 from gearmbs.drivetrain.connections import Bearing
 from gearmbs.drivetrain.couplings.aligned import Coupling
 from gearmbs.drivetrain.couplings.misaligned import roles
@@ -289,12 +290,20 @@ SAME_POINT = 1e-9
 """Distance, m, up to which a point is a bearing's seat: rounding of places computed in two ways."""
 
 
-def build(train: Drivetrain) -> Mechanism:
-    """Return the mechanism of a drivetrain; see :meth:`gearmbs.drivetrain.Drivetrain.build`."""
+def build(train: Drivetrain, apart: Mapping[str, str] | None = None) -> Mechanism:
+    """Return the mechanism of a drivetrain; see :meth:`gearmbs.drivetrain.Drivetrain.build`.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    apart : mapping of str to str, optional
+        Wheels that are to be bodies of their own, by name, and how the joints are called that fix them to their shafts:
+        the reaction there is the force between wheel and shaft. None of a planetary stage.
+    """
     layout = train.layout
     m = Mechanism(train.name, gravity=train.gravity)
     m.rate_scale = train.rate_scale
-    builder = _Builder(train, layout, m)
+    builder = _Builder(train, layout, m, apart or {})
     for shaft in train.shafts:
         builder.shaft(shaft)
     for housing in train.housings:
@@ -337,8 +346,8 @@ def _text_of(train: Drivetrain, m: Mechanism, sensor: Sensor) -> str:
 class _Builder:
     """Adds parts to a mechanism, one at a time."""
 
-    def __init__(self, train: Drivetrain, layout: Layout, m: Mechanism) -> None:
-        self.train, self.layout, self.m = train, layout, m
+    def __init__(self, train: Drivetrain, layout: Layout, m: Mechanism, apart: Mapping[str, str]) -> None:
+        self.train, self.layout, self.m, self.apart = train, layout, m, apart
         self.wheels: dict[str, Marker] = {}
 
     def body(self, name: str) -> Body:
@@ -349,7 +358,9 @@ class _Builder:
         """Add the body of a shaft with its wheels, a marker at each wheel."""
         train, layout = self.train, self.layout
         seat = layout.seats[shaft.name]
-        self._warn_of_solid_wheels(shaft)
+        bare = any(wheel.name in self.apart for wheel in train.wheels if wheel.shaft == shaft.name)
+        if not bare:
+            self._warn_of_solid_wheels(shaft)
         spin = train.start_share * train.speeds[shaft.name] * layout.paces[shaft.name]
         where = {
             "position": seat.origin,
@@ -357,20 +368,40 @@ class _Builder:
             "angular_velocity": spin * seat.axes[:, 2],
         }
         if shaft.modes is None:
-            body = self._rigid_shaft(shaft, where)
+            body = self._rigid_shaft(shaft, where, bare=bare)
         else:
-            body = train.modal_models[shaft.name].add_to(self.m, shaft.name, damping=shaft.damping, **where)
+            model = shaft_model(train, shaft, bare=True) if bare else train.modal_models[shaft.name]
+            body = model.add_to(self.m, shaft.name, damping=shaft.damping, **where)
         for wheel in train.wheels:
             if wheel.shaft == shaft.name:
                 turned = turn_z(layout.wheels[wheel.name])
-                self.wheels[wheel.name] = body.marker((0.0, 0.0, train.station(wheel)), turned, name=wheel.name)
+                place = body.marker(
+                    (0.0, 0.0, train.station(wheel)), turned, name=f"{wheel.name}.I" if bare else wheel.name
+                )
+                self.wheels[wheel.name] = self._apart(wheel, place, where["angular_velocity"]) if bare else place
 
-    def _rigid_shaft(self, shaft: Shaft, where: dict[str, Any]) -> Body:
-        """Return the body of a rigid shaft with its wheels."""
+    def _apart(self, wheel: Wheel, place: Marker, angular_velocity: np.ndarray) -> Marker:
+        """Return the marker of a wheel that is a body of its own, fixed to its place on its shaft."""
+        gear = wheel.gear
+        body = self.m.body(
+            wheel.name,
+            gear.mass,
+            gear.inertia,
+            position=place.global_position(),
+            orientation=place.global_orientation(),
+            angular_velocity=angular_velocity,
+        )
+        marker = body.marker(name=f"{wheel.name}.mesh")
+        self.m.joint("fixed", self.apart[wheel.name], marker, place)
+        return marker
+
+    def _rigid_shaft(self, shaft: Shaft, where: dict[str, Any], *, bare: bool) -> Body:
+        """Return the body of a rigid shaft with its wheels, or without."""
         train = self.train
         mass, centre, polar, across = shaft.body()
         pieces = [(mass, centre, np.diag([across, across, polar]))]
-        pieces += [(one.mass, one.station, np.diag(one.inertia)) for one in carried(train, shaft.name)]
+        others = [] if bare else carried(train, shaft.name)
+        pieces += [(one.mass, one.station, np.diag(one.inertia)) for one in others]
         total = sum(p[0] for p in pieces)
         middle = sum(p[0] * p[1] for p in pieces) / total
         inertia = sum(p[2] + p[0] * (p[1] - middle) ** 2 * np.diag([1.0, 1.0, 0.0]) for p in pieces)

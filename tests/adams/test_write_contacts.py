@@ -232,7 +232,8 @@ def written(m):
 
 @pytest.mark.parametrize("sense", [1, -1])
 def test_a_ring_as_expressions_turns_and_bears_as_it_does(sense):
-    m = gear_rig(internal(), speed=100.0 * sense, run_up=0.01)
+    pair = internal()
+    m = gear_rig(pair, speed=100.0 * sense, torque=sense * pair.operating_point.torque, run_up=0.01)
     a, b = (x.simulate(0.003, rate=2000, tol=1e-8, rate_scale=2000.0) for x in (m, written(m)))
     turned = a.joint_angle("bearing 2")
     assert sense * turned[-1] > 0.005

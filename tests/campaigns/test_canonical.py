@@ -31,6 +31,7 @@ PLAIN = key()
         {"gears": {"addendum": 95e-3 / 31}},
         {"gears": {"tip_radius": 47.5e-3}},
         {"fault": {"plane": "inclination"}},
+        {"gears": {"hand": "left"}},
         {"fault": {"centre_distance_error": -0.0, "backlash": "0.1 mm"}},
     ],
     ids=str,
@@ -50,11 +51,20 @@ def test_the_same_in_other_words(same):
         {"friction": {"static": 0.0, "dynamic": 0.0}},
         {"solver": {"tolerance": 1e-8}},
         {"solver": {"lump": True}},
+        {"gears": {"helix_angle": "10 deg"}},
+        {"shafts": {"modes": 2}},
+        {"shafts": {"bearings": "6206"}},
     ],
     ids=str,
 )
 def test_another_case(other):
     assert key(**other) != PLAIN
+
+
+def test_settings_that_came_later_leave_the_keys_of_others():
+    content = canonical_case(Case())
+    assert content["shafts"].keys() == {"radius", "length", "density"}
+    assert not {"helix_angle", "hand", "internal"} & content["gears"].keys()
 
 
 def test_without_friction_its_coefficients_do_not_count():

@@ -228,6 +228,10 @@ def variables_for(keep: Sequence[str]) -> set[str] | None:
     return wanted | _arrays(keep).keys()
 
 
+PARTS_OF_SHAFTS = ("modes", "bearings", "bearing_distance")
+"""Settings of shafts that bend or stand in rolling bearings."""
+
+
 def canonical_case(case: Case) -> dict[str, Any]:
     """Return the content of a case: SI, defaults filled in, without its name and without what has no effect.
 
@@ -244,6 +248,11 @@ def canonical_case(case: Case) -> dict[str, Any]:
     data["solver"] |= {"tolerance": case.tolerance, "lump": case.lump}
     wheels = case.pair().wheels
     gears = data["gears"]
+    # what cases had before spur wheels on rigid shafts were not the only ones keeps its key
+    for table, names in ((gears, ("helix_angle", "hand", "internal")), (data["shafts"], PARTS_OF_SHAFTS)):
+        if not any(table[name] for name in names if name != "hand"):
+            for name in names:
+                del table[name]
     for name, value in gears.items():
         gears[name] = list(value) if isinstance(value, (tuple, list)) else [value, value]
     for name in ("module", "pressure_angle"):

@@ -148,6 +148,13 @@ class Case(Section, Shown):
             )
         if not f.teeth:
             self.__dict__["_built"] = sound
+        if self.shafts.are_parts:
+            from gearmbs.studies.case.train import parts_of
+
+            try:
+                parts_of(self)
+            except CaseError as error:
+                raise ValueError(str(error).partition(": ")[2]) from None
         return self
 
     def pair(self) -> GearPair:

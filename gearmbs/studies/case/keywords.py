@@ -34,6 +34,9 @@ class GearsKeywords(TypedDict, total=False):
     density: Each
     youngs_modulus: Each
     poisson_ratio: float | Sequence[float]
+    helix_angle: QuantityLike
+    hand: Literal["right", "left"]
+    internal: bool
 
 
 class ShaftsKeywords(TypedDict, total=False):
@@ -42,6 +45,9 @@ class ShaftsKeywords(TypedDict, total=False):
     radius: QuantityLike
     length: QuantityLike
     density: QuantityLike
+    modes: int | Literal["all"] | None
+    bearings: str | Sequence[str] | None
+    bearing_distance: QuantityLike | None
 
 
 class OperationKeywords(TypedDict, total=False):

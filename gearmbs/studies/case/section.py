@@ -32,6 +32,8 @@ BoreRadius = Annotated[float | tuple[float, float], Measure("length", 0, 5000, "
 TipRounding = Annotated[float | tuple[float, float], Measure("length", 0, 100, "mm", each=True)]
 ShaftRadius = Annotated[float, Measure("length", 0.1, 5000, "mm")]
 ShaftLength = Annotated[float, Measure("length", 0.1, 50000, "mm")]
+BearingDistance = Annotated[float | None, Measure("length", 0.1, 50000, "mm")]
+HelixAngle = Annotated[float, Measure("angle", 0, 60, "deg")]
 Shift = Annotated[float, Measure("length", -2000, 2000, "mm")]
 DistanceError = Annotated[float, Measure("length", -100, 100, "mm")]
 Backlash = Annotated[float, Measure("length", None, 20, "mm")]

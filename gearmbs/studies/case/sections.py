@@ -45,26 +45,32 @@ def _both(value: Any) -> Any:
     return two(value) if isinstance(value, Sequence) and not isinstance(value, str) else (value, value)
 
 
+def _designations(value: Any) -> Any:
+    """Return one designation for both shafts as two."""
+    return value if value is None else (value, value) if isinstance(value, str) else two(value)
+
+
+def _modes(value: Any) -> Any:
+    counted = isinstance(value, int) and not isinstance(value, bool) and value >= 1
+    if value is None or value == "all" or counted:
+        return value
+    raise ValueError("give a whole number from 1 up, or 'all'; leave it out for rigid shafts")
+
+
 def _upper(value: Any) -> Any:
     return value.upper() if isinstance(value, str) else value
-
-
-OTHER_WHEELS = (
-    "a case is an external spur pair; internal and helical wheels are those of a drivetrain ([wheels.a]) or gm.GearSpec"
-)
-"""Where keys of other wheels belong."""
 
 
 class Gears(Section):
     """The wheels: the paper's table, or numbers of one's own.
 
-    Attributes are those of :class:`gearmbs.gears.GearSpec` and its material; all but module and pressure angle may be
-    given once for both wheels or as a list of two, driver and driven. ``tip_radius`` and ``root_radius`` take the place
-    of ``addendum`` and ``dedendum``.
+    Attributes are those of :class:`gearmbs.gears.GearSpec` and its material; all but module, pressure angle and those
+    of the helix may be given once for both wheels or as a list of two, driver and driven. ``tip_radius`` and
+    ``root_radius`` take the place of ``addendum`` and ``dedendum``. ``hand`` is the driver's, to which the driven
+    wheel's follows; with ``internal`` this one is a ring.
     """
 
     section: ClassVar[str] = "gears"
-    elsewhere: ClassVar[dict[str, str]] = dict.fromkeys(("internal", "helix_angle", "hand"), OTHER_WHEELS)
 
     teeth: Annotated[tuple[int, int], BeforeValidator(_both)] = (29, 29)
     module: q.Module = 95e-3 / 31
@@ -81,6 +87,9 @@ class Gears(Section):
     density: q.WheelDensity = 7850.0
     youngs_modulus: q.Modulus = 2.07e11
     poisson_ratio: q.PoissonRatio = 0.29
+    helix_angle: q.HelixAngle = 0.0
+    hand: Literal["right", "left"] = "right"
+    internal: Annotated[bool, BeforeValidator(flag)] = False
 
     if TYPE_CHECKING:
 
@@ -94,11 +103,12 @@ class Gears(Section):
             if getattr(self, height) is not None:
                 raise ValueError(f"{radius} and {height} say the same; give one of them")
             for wheel, name in enumerate(WHEELS):
-                value, pitch = self.of_wheel(radius, wheel), 0.5 * self.module * self.teeth[wheel]
-                if outwards * (value - pitch) <= 0.0:
+                value, pitch = self.of_wheel(radius, wheel), self._pitch_radius(wheel)
+                beyond = -outwards if self._is_ring(wheel) else outwards
+                if beyond * (value - pitch) <= 0.0:
                     raise ValueError(
                         f"{radius} of the {name} wheel is {value * 1e3:.4f} mm, "
-                        f"{'inside' if outwards > 0 else 'outside'} its pitch circle of {pitch * 1e3:.4f} mm; "
+                        f"{'inside' if beyond > 0 else 'outside'} its pitch circle of {pitch * 1e3:.4f} mm; "
                         "change it or give both wheels their own, [driver, driven]"
                     )
         return self
@@ -113,7 +123,13 @@ class Gears(Section):
         radius = self.of_wheel("tip_radius" if above else "root_radius", wheel)
         if radius is None:
             return self.of_wheel("addendum" if above else "dedendum", wheel)
-        return abs(radius - 0.5 * self.module * self.teeth[wheel])
+        return abs(radius - self._pitch_radius(wheel))
+
+    def _pitch_radius(self, wheel: int) -> float:
+        return 0.5 * self.module * self.teeth[wheel] / math.cos(self.helix_angle)
+
+    def _is_ring(self, wheel: int) -> bool:
+        return self.internal and wheel == 1
 
     @cached_property
     def wheels(self) -> tuple[GearSpec, GearSpec]:
@@ -130,7 +146,10 @@ class Gears(Section):
         from gearmbs.gears import GearSpec, Material
 
         material = Material(*(self.of_wheel(key, wheel) for key in ("youngs_modulus", "poisson_ratio", "density")))
-        own = ("face_width", "fillet_radius", "bore_radius", "tip_rounding")
+        own = ("face_width", "fillet_radius", "tip_rounding")
+        is_ring = self._is_ring(wheel)
+        # a ring has the hand of its mate, and no bore
+        other: Literal["right", "left"] = "left" if self.hand == "right" else "right"
         return GearSpec(
             self.teeth[wheel],
             self.module,
@@ -140,22 +159,64 @@ class Gears(Section):
             profile_shift=self.profile_shift[wheel],
             material=material,
             name=WHEELS[wheel],
+            helix_angle=self.helix_angle,
+            hand=self.hand if wheel == 0 or is_ring else other,
+            internal=is_ring,
+            bore_radius=0.0 if is_ring else self.of_wheel("bore_radius", wheel),
             **{key: self.of_wheel(key, wheel) for key in own},
         )
 
 
 class Shafts(Section):
-    """Both shafts: solid steel cylinders centred on their wheels."""
+    """Both shafts: cylinders of steel centred on their wheels.
+
+    They are rigid and turn in revolute joints, unless it is said otherwise; see `gearmbs.studies.case.train`.
+
+    Attributes
+    ----------
+    modes : int or "all", optional
+        The shafts bend, twist and stretch, by so many of their shapes beside those of what they carry, as of
+        `gearmbs.drivetrain.Shaft`.
+    bearings : str or sequence of 2 str, optional
+        Rolling bearings by their designation, two on each shaft: of all, or of the driver's and of the driven shaft.
+    bearing_distance : float or str, optional
+        Between the bearings of a shaft, which stand as far from the wheel on either side; default: its length.
+    """
 
     section: ClassVar[str] = "shafts"
 
     radius: q.ShaftRadius = 0.015
     length: q.ShaftLength = 0.200
     density: q.Density = 7850.0
+    modes: Annotated[int | Literal["all"] | None, BeforeValidator(_modes)] = None
+    bearings: Annotated[tuple[str, str] | None, BeforeValidator(_designations)] = None
+    bearing_distance: q.BearingDistance = None
 
     if TYPE_CHECKING:
 
         def __init__(self, **fields: Unpack[told.ShaftsKeywords]) -> None: ...
+
+    @property
+    def are_parts(self) -> bool:
+        """Whether they bend or stand in rolling bearings, so that the case is simulated as a drivetrain's parts."""
+        return self.modes is not None or self.bearings is not None
+
+    @model_validator(mode="after")
+    def _seated(self) -> Shafts:
+        distance = self.bearing_distance
+        if distance is None:
+            return self
+        if not self.are_parts:
+            raise ValueError(
+                f"bearing_distance is {distance * 1e3:g} mm, but the shafts are rigid and turn in joints; give "
+                "bearings or modes, too"
+            )
+        if distance > self.length:
+            raise ValueError(
+                f"bearing_distance is {distance * 1e3:g} mm, and the shafts are {self.length * 1e3:g} mm long; give "
+                "less, or a greater length"
+            )
+        return self
 
 
 INPUT_TORQUE = "torque is that of the driven wheel: give the driver's times z_2 / z_1 there"

@@ -33,7 +33,7 @@ from gearmbs.signals.resampling import MARGIN, monotone_cubic
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.case.limits import HARMONICS, geometric_period
 from gearmbs.studies.run.levels import bands_of_lines
-from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Recorder, Span
+from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Recorder, Span, to_mesh
 
 SAMPLES = 1024
 """Samples of a mesh period, ten of a contact that lasts a hundredth of it; means over each lower the first harmonics by
@@ -125,7 +125,12 @@ class PeriodicRecorder:
         self._longest = int((operation.settling + operation.longest) * self._gmf)
         self.recorder = Recorder(case, self._begin - (MARGIN + 1) / case.output_rate)
         pair = case.pair()
-        self._components = partial(component_values, pressure_angle=pair.working_pressure_angle, sense=pair.rotation)
+        self._components = partial(
+            component_values,
+            pressure_angle=pair.working_pressure_angle,
+            centre_line=to_mesh(pair),
+            sense=pair.rotation,
+        )
         self._amplitudes = np.empty((0, HARMONICS, len(COMPONENTS)), dtype=complex)
         self._watched = False
         self.found: Found | None = None

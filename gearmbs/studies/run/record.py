@@ -24,7 +24,7 @@ from gearmbs.studies.case.drive import drive_angle
 from gearmbs.studies.case.limits import remarks
 from gearmbs.studies.case.sections import units_of_fields
 from gearmbs.studies.run.levels import LEVELS, level_parts, mesh_levels, tracked_levels
-from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of
+from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of, to_mesh
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -234,7 +234,7 @@ def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) ->
         t = t[first] + np.arange(len(force)) / rate
     first, last = np.searchsorted(t, [at - 0.5 / rate for at in (start, stop)])
     force = force[first:last]
-    values = component_values(force[:, :-1], angle, sense=pair.rotation)
+    values = component_values(force[:, :-1], angle, to_mesh(pair), sense=pair.rotation)
     values[:, -1] = force[:, -1]
     values /= mass
     return make_signal(

@@ -72,6 +72,11 @@ class Measured(NamedTuple):
     contact: dict[str, np.ndarray]
 
 
+def to_mesh(pair: GearPair) -> tuple[float, float, float]:
+    """Return the direction from the driver's axis to its mesh: that of the mate's axis, or away from that of a ring."""
+    return (1.0 if pair.geometry.sign > 0 else -1.0), 0.0, 0.0
+
+
 class _Turned:
     """Follows the angles by which the wheels have turned, for the lag of the driven one."""
 
@@ -79,8 +84,10 @@ class _Turned:
         self.pair = pair = case.pair()
         place = pair.placement(0.0)
         self._axes = np.array([place.axes_1, place.axes_2])
-        self._ratio = case.gears.teeth[0] / case.gears.teeth[1]
-        self._lag = pair.rotation * pair.wheels[1].base_radius
+        # a ring turns as its pinion does
+        sign = 1 if pair.geometry.sign > 0 else -1
+        self._ratio = sign * case.gears.teeth[0] / case.gears.teeth[1]
+        self._lag = sign * pair.rotation * pair.wheels[1].base_radius
         self._last = np.full(2, np.nan)
         self._pitch = pair.driver.base_pitch
         self._whole: float | None = None

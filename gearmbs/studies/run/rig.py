@@ -101,7 +101,7 @@ def gear_rig(
     if start < run_up:
         raise ValueError(f"start: {start:g} s is before the end of run_up, {run_up:g} s; give a later one")
     angle = drive_angle(speed, run_up, start, point.rotation)
-    load = load_torque(point.torque if torque is None else torque, run_up, start, point.rotation)
+    load = load_torque(point.torque if torque is None else torque, run_up, start, resisting(pair))
     shaft_radius = to_si(shaft_radius, "length", "shaft_radius")
     shaft_length = to_si(shaft_length, "length", "shaft_length")
     shaft_density = to_si(shaft_density, "density", "shaft_density")
@@ -121,6 +121,11 @@ def gear_rig(
     rig.aliases["operation.torque"] = f"{LOAD}.torque"
     rig.gear_contact(MESH, rig.bodies[GEARS[0]], rig.bodies[GEARS[1]], pair)
     return rig
+
+
+def resisting(pair: GearPair) -> int:
+    """Return the sense about the driver's axis in which a torque on the driven wheel resists; a ring turns alike."""
+    return pair.rotation if pair.geometry.sign > 0 else -pair.rotation
 
 
 # Rigs with rolling bearings: one bearing in a housing on mounts, and the gear pair on four bearings.
@@ -344,7 +349,7 @@ def flexible_rig(
 
     point = pair.operating_point
     speed = point.rotation * to_si(speed, "angular speed", "speed")
-    torque = point.rotation * (point.torque if torque is None else to_si(torque, "torque", "torque"))
+    torque = resisting(pair) * (point.torque if torque is None else to_si(torque, "torque", "torque"))
     run_up = to_si(run_up, "time", "run_up")
     length = to_si(shaft_length, "length", "shaft_length")
     diameter = 2.0 * to_si(shaft_radius, "length", "shaft_radius")

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from gearmbs.bearings import Bearing
     from gearmbs.bearings.settings import BearingKeywords
+    from gearmbs.drivetrain import Drivetrain
     from gearmbs.mechanism import Mechanism
     from gearmbs.mechanism.solve.keywords import RunOptions
     from gearmbs.units import QuantityLike
@@ -159,11 +160,17 @@ def case_mechanism(
     ----------
     case : Case
     bearing : Bearing or str, optional
-        Rolling bearing of which two stand on each shaft, see `rolling_rig`, or its designation; default joints.
+        Rolling bearing of which two stand on each rigid shaft, see `rolling_rig`, or its designation; default: what the
+        case's shafts say.
     each : mapping of str to dict, optional
         Settings of single bearings by name, which overrule those of all.
     **settings
         Of all four bearings, as of `gearmbs.bearings.RollingBearing`.
+
+    Raises
+    ------
+    CaseError
+        For a bearing beside shafts that say what they stand in, or bend.
 
     Examples
     --------
@@ -176,6 +183,15 @@ def case_mechanism(
     (1, 0)
     """
     operation, shafts = case.operation, case.shafts
+    if shafts.are_parts:
+        if bearing is not None:
+            raise CaseError(
+                f"bearing is {bearing!r}, and case '{case.name}' has shafts that bend or stand in bearings of their "
+                f"own; give case.changed(shafts={{'bearings': {bearing!r}}})"
+            )
+        from gearmbs.studies.case.train import mechanism_of_parts
+
+        return mechanism_of_parts(case, {**settings}, each)
     rigged: dict[str, Any] = {
         "speed": operation.speed,
         "torque": operation.torque,
@@ -192,6 +208,42 @@ def case_mechanism(
 
     one = Bearing.from_designation(bearing) if isinstance(bearing, str) else bearing
     return rolling_rig(case.pair(), one, settings={**settings}, each=each, **rigged)
+
+
+def case_train(case: Case) -> Drivetrain:
+    """Return a case as a drivetrain: for its modes, its Campbell diagram, its report, or to go on from it.
+
+    Parameters
+    ----------
+    case : Case
+        At a constant torque.
+
+    Returns
+    -------
+    Drivetrain
+        Named parts: shaft 1, shaft 2, gear 1, gear 2, mesh, drive, load, and the bearings: of rolling ones
+        bearing 1 a, bearing 1 b, bearing 2 a, bearing 2 b.
+
+    Raises
+    ------
+    CaseError
+        For a torque that follows a curve, and for shafts whose bearings do not hold them.
+
+    Examples
+    --------
+    >>> from gearmbs.studies import Case
+    >>> train = case_train(Case(shafts={"modes": 4, "bearings": "6206"}))
+    >>> [bearing.name for bearing in train.bearings]
+    ['bearing 1 a', 'bearing 1 b', 'bearing 2 a', 'bearing 2 b']
+    """
+    if case.operation.torque_curve is not None:
+        raise CaseError(
+            f"case '{case.name}': operation.torque follows a curve, and a drivetrain takes one that begins with the "
+            "simulation: give case.changed(operation={'torque': ...}) a single one; run_case follows curves"
+        )
+    from gearmbs.studies.case.train import parts_of
+
+    return parts_of(case)
 
 
 def run_case(
@@ -267,7 +319,11 @@ def _recorded(
 ) -> Recorded:
     """Simulate a case that has been checked, and return its record; see `run_case`."""
     load_kernels(case.solver.integrator, case.lump)
-    periodic = PeriodicRecorder(case, mechanism is None, precision=precision) if case.is_auto else None
+    # what rolls in bearings does not come back with the teeth
+    known_period = mechanism is None and case.shafts.bearings is None
+    if mechanism is None and case.shafts.are_parts:
+        mechanism = case_mechanism(case)
+    periodic = PeriodicRecorder(case, known_period, precision=precision) if case.is_auto else None
     recorder = Recorder(case) if periodic is None else periodic.recorder
     apart = Separations(case) if precision is not None and periodic is None else None
 

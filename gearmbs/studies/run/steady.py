@@ -164,6 +164,11 @@ def posed_case(case: Case) -> tuple[Case, Posed, AtValue, float]:
     operation = case.operation
     if operation.speed_curve is not None or not np.isscalar(operation.torque):
         raise CaseError("steady: speed and torque have to be constant; run_case follows curves")
+    if case.shafts.are_parts:
+        raise CaseError(
+            "steady: of a case the bodies turn about fixed axes, and its shafts bend or stand in rolling bearings; "
+            "give steady(case_train(case)), or take run_case with the duration 'auto'"
+        )
     if not INTEGRATORS[case.solver.integrator].can("dense_output"):
         able = any_of(those_that("dense_output"))
         raise CaseError(f"steady: solver.integrator = {case.solver.integrator!r} has no stored steps; take {able}")
