@@ -22,10 +22,10 @@ from functools import cache
 from pathlib import Path
 
 import gearmbs
+from gearmbs import kernels
 from gearmbs.adams import DeckError, parse_deck, parse_script, run_deck
 from gearmbs.adams.builders.routines import bound
 from gearmbs.adams.session import check_script
-from gearmbs.kernels.cache import folders
 
 from . import (
     test_accelerations,
@@ -72,10 +72,22 @@ _touched: list[str] = []
 _watching = False
 
 
+def _folders_of_kernels() -> tuple[Path, ...]:
+    """Return where the kernels of the package are kept, in whichever mode they are compiled."""
+    if kernels.PLAIN:
+        from gearmbs.kernels.plain.jit import folder
+
+        return (folder("gearmbs"),)
+    from gearmbs.kernels.cache import folders
+
+    return folders("gearmbs")
+
+
 @cache
 def _own() -> tuple[str | Path, ...]:
     """Return Python's own folders and those of kernels, which a deck may cause to be touched."""
-    found = [sys.prefix, sys.base_prefix, Path(gearmbs.__file__).parent, "/proc", "/dev/null", *folders("gearmbs")]
+    package = Path(gearmbs.__file__).parent
+    found = [sys.prefix, sys.base_prefix, package, "/proc", "/dev/null", *_folders_of_kernels()]
     return (*found, *([os.environ["NUMBA_CACHE_DIR"]] if "NUMBA_CACHE_DIR" in os.environ else []))
 
 
