@@ -148,15 +148,26 @@ UNUSED = {
 """Modules that no run of a rigid pair on joints has a use for."""
 
 
+CASE = "make_case({'operation': {'duration': '0.06 s', 'settling': '0 s'}})"
+CALLS = {
+    "simulate_case": (
+        f"from gearmbs.studies import make_case, simulate_case; simulate_case({CASE})",
+        UNUSED | {"xarray", "pandas"},
+    ),
+    "run_case": (f"from gearmbs.studies import make_case, run_case; run_case({CASE})", UNUSED),
+    "a campaign's case": (
+        "from gearmbs.campaigns import PairSubject; s = PairSubject(); c = s.check(s.base(), 'a'); "
+        "keep = ['harmonics', 'contact']; s.reduce(c, s.run(c, lambda f: None, keep), keep)",
+        UNUSED | {"xarray", "pandas"},
+    ),
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("call", "unused"),
-    [("simulate_case", UNUSED | {"xarray", "pandas"}), ("run_case", UNUSED)],
-)
-def test_a_run_imports_only_what_it_uses(call, unused):
-    code = f"from gearmbs.studies import make_case, {call}; import sys; "
-    code += f"{call}(make_case({{'operation': {{'duration': '0.06 s', 'settling': '0 s'}}}})); "
-    code += f"print({unused!r} & {{*sys.modules}})"
+@pytest.mark.parametrize("call", CALLS)
+def test_a_run_imports_only_what_it_uses(call):
+    code, unused = CALLS[call]
+    code += f"; import sys; print({unused!r} & {{*sys.modules}})"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     assert subprocess.check_output([sys.executable, "-c", code], env=environment, text=True, cwd="/") == "set()\n"
 

@@ -217,17 +217,19 @@ class CaseProblem(LevelProblem):
         return found
 
     def _of_run(self, case: Case) -> Levels:
-        from gearmbs.studies import SimulationFailed, run_case
+        from gearmbs.studies.run.record import values_of
+        from gearmbs.studies.run.simulation import SimulationFailed, plain_record
 
         try:
-            record = run_case(case, False, variables=["gmf_rms"])
-            levels = record["gmf_rms"].sel(way=self.way)
+            record = plain_record(case, False, variables=["gmf_rms"])
         except (SimulationFailed, ValueError):
             return {}
+        levels, ways = values_of(record, "gmf_rms"), values_of(record, "way")
+        (found,) = levels[ways == self.way]
         return {
-            (str(c), int(h)): float(levels.sel(component=c, harmonic=h))
-            for c in levels.component.values
-            for h in levels.harmonic.values
+            (str(c), int(h)): float(found[i, j])
+            for i, h in enumerate(values_of(record, "harmonic"))
+            for j, c in enumerate(values_of(record, "component"))
         }
 
     def _of_motion(self, key: Key, case: Case) -> Levels | None:

@@ -27,7 +27,7 @@ def with_friction(case: Case, node: float) -> Case:
 
 
 def run_stored(case: Case, *args, **kwargs) -> xr.Dataset:
-    """Return the levels of a case, interpolated between those that are stored; it takes the place of `run_case`."""
+    """Return the levels of a case, interpolated between those that are stored; it takes the place of `plain_record`."""
     assert math.isclose(case.friction.static, 2.0 * case.friction.dynamic)
     name = next(name for name, known in CASES.items() if with_friction(known, 0.0) == with_friction(case, 0.0))
     node = math.log(case.friction.dynamic / FRICTION[1]) / math.log(FRICTION[2] / FRICTION[1])

@@ -72,7 +72,7 @@ def test_backlash_of_a_healthy_pair_cannot_be_told(measured):
 def test_friction_is_found_again(measured, run, monkeypatch):
     """From numbers with a gain of three that the fit does not know."""
     if run is not None:
-        monkeypatch.setattr("gearmbs.studies.run_case", run)
+        monkeypatch.setattr("gearmbs.studies.run.simulation.plain_record", run)
     table, cases = measured
     table = table.assign(value=3.0 * table["value"])
     free = [Free("friction.dynamic", 0.035, 0.01, 0.2, also={"friction.static": 2.0})]

@@ -16,7 +16,7 @@ FRICTION = Free("friction.dynamic", 0.05, 0.01, 0.2, also={"friction.static": 2.
 @pytest.mark.parametrize("planted", ["skew", "inclination"])
 def test_the_plane_of_a_misalignment_is_chosen(planted, monkeypatch):
     """From six noisy numbers of one recording of a sensor of unknown gain, with friction unknown, too."""
-    monkeypatch.setattr("gearmbs.studies.run_case", run_stored)
+    monkeypatch.setattr("gearmbs.studies.run.simulation.plain_record", run_stored)
     planes = {p: CASES[p] for p in ("skew", "inclination")}
     secret = planes[planted].changed(friction={"static": 0.12, "dynamic": 0.06})
     levels = run_stored(secret)["gmf_rms"].sel(way="orders")

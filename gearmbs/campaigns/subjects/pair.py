@@ -29,6 +29,8 @@ from gearmbs.units import to_si
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearmbs.studies.run.record import PlainRecord
+
 FIRST_ORDERS = 3
 PERIODIC = {"harmonics", "contact"}
 """What a motion that repeats itself is known by. Signals of all cases have one length, indicators look at what is left
@@ -157,14 +159,15 @@ class PairSubject(Subject):
         """Return the content of a case; see `canonical_case`."""
         return canonical_case(thing)
 
-    def run(self, thing: Case, progress: Callable[[float], None], keep: Sequence[str]) -> xr.Dataset:
-        """Return the record of a case."""
-        from gearmbs.studies.run.simulation import run_case
+    def run(self, thing: Case, progress: Callable[[float], None], keep: Sequence[str]) -> PlainRecord | xr.Dataset:
+        """Return the record of a case: plain arrays where numbers alone are kept that are made of them."""
+        from gearmbs.studies.run.simulation import plain_record
 
         thing = self.as_simulated(thing, keep)
         operation = thing.operation
         span = operation.run_up + operation.settling + operation.longest
-        return run_case(thing, lambda t: progress(t / span), variables=variables_for(keep))
+        record = plain_record(thing, lambda t: progress(t / span), variables=variables_for(keep))
+        return record if PERIODIC.issuperset(keep) else record.dataset()
 
     def reduce(self, thing: Case, record: Any, keep: Sequence[str]) -> Kept:
         """Return of a record what is kept."""
@@ -280,12 +283,15 @@ def harmonics(record: Any) -> dict[str, float]:
     """
     if "gmf_rms" not in record:
         return {}
-    levels = record["gmf_rms"].transpose("way", "component", "harmonic")
+    from gearmbs.studies.run.record import values_of
+
+    levels = values_of(record, "gmf_rms")
+    ways, numbers, components = (values_of(record, name) for name in ("way", "harmonic", "component"))
     return {
-        f"{way}.{component}.{harmonic}": float(levels.values[i, j, k])
-        for i, way in enumerate(levels.way.values)
-        for j, component in enumerate(levels.component.values)
-        for k, harmonic in enumerate(levels.harmonic.values)
+        f"{way}.{component}.{number}": float(levels[i, k, j])
+        for i, way in enumerate(ways)
+        for j, component in enumerate(components)
+        for k, number in enumerate(numbers)
     }
 
 
@@ -296,7 +302,9 @@ def record_numbers(record: Any) -> dict[str, float]:
     0; ``record.deviation``: by what part of its mesh harmonics it repeats itself, where it was watched;
     ``record.apart``: part of the time behind the run-up in which no drive flanks touch.
     """
-    about = record.attrs
+    from gearmbs.studies.run.record import told_of
+
+    about = told_of(record)
     if "record_status" not in about:
         return {}
     found = {"at_limit": float(about["record_status"] != "periodic"), "apart": float(about["record_apart"])}
@@ -312,13 +320,15 @@ def contact_numbers(case: Case, record: Any) -> dict[str, float]:
     coast flank), ``error.mean``, ``error.peak_to_peak`` and its mesh harmonics' amplitudes ``error.K`` (m), which a
     record of changing speed has not.
     """
-    force, error = record["normal_force"].values, record["transmission_error"].values
+    from gearmbs.studies.run.record import values_of
+
+    force, error, depth, back = (values_of(record, name) for name in NEEDED["contact"])
     amplitudes = {} if case.operation.speed_curve else error_harmonics(case, error)
     return {
         "force.mean": float(force.mean()),
         "force.max": float(force.max()),
-        "penetration.max": float(record["penetration_drive"].max()),
-        "two_flanks": float(np.mean(record["pairs_back"].values > 0)),
+        "penetration.max": float(depth.max()),
+        "two_flanks": float(np.mean(back > 0)),
         "error.mean": float(error.mean()),
         "error.peak_to_peak": float(np.ptp(error)),
         **amplitudes,
@@ -476,6 +486,7 @@ class ClaimsSubject(Subject):
         import xarray as xr
 
         from gearmbs.studies.presets.paper_cases import LOAD_NAMES, STATES
+        from gearmbs.studies.run.record import values_of
 
         levels = []
         for k, case in enumerate(thing):
@@ -484,16 +495,17 @@ class ClaimsSubject(Subject):
                 lambda fraction, k=k: progress((k + fraction) / len(thing)),  # type: ignore[misc]
                 ("harmonics",),
             )
-            levels.append(record["gmf_rms"].sel(way="orders").transpose("component", "harmonic"))
+            (found,) = values_of(record, "gmf_rms")[values_of(record, "way") == "orders"]
+            levels.append(found.T)
         shape = (len(LOAD_NAMES), len(STATES), *levels[0].shape)
         return xr.DataArray(
-            np.array([level.values for level in levels]).reshape(shape),
+            np.array(levels).reshape(shape),
             dims=("load", "state", "component", "harmonic"),
             coords={
                 "load": list(LOAD_NAMES),
                 "state": list(STATES),
-                "component": levels[0].component.values,
-                "harmonic": levels[0].harmonic.values,
+                "component": values_of(record, "component"),
+                "harmonic": values_of(record, "harmonic"),
             },
         )
 

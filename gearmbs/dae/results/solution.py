@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, SolverStats, Status
 from gearmbs.dae.results.frames import Evaluated
 from gearmbs.dae.results.measured import Measured
+from gearmbs.dae.results.shared import Fills, Shared
 from gearmbs.dae.state import State
 from gearmbs.progress import waiting
 from gearmbs.units import to_si
@@ -47,16 +48,6 @@ NEAR = 8
 
 CONFLICT_SAMPLES = 50
 """Outputs at which constraints removed as redundant are looked at."""
-
-
-class Fills(Protocol):
-    """What evaluates outputs: fills records piece by piece, in the order of time."""
-
-    rdata: np.ndarray
-
-    def fill(self, t: np.ndarray, y: np.ndarray, epochs: Any, records: outputs.Records) -> None:
-        """Fill ``records`` for all rows of ``y``; ``epochs`` names the integer tables valid from each row on."""
-        ...
 
 
 def _sum_of_rows(records: np.ndarray, rows: list[int]) -> np.ndarray:
@@ -128,7 +119,7 @@ class Solution(Measured, Shown):
         self.initial: State | None = None
         self.given: np.ndarray | None = None
         self.t = result.t
-        self._shared: tuple[Fills, outputs.Records] | None = None
+        self._shared: Shared | None = None
         samples = np.linspace(0, self.t.size - 1, min(self.t.size, CONFLICT_SAMPLES))
         self._conflict = self.find_conflict(np.unique(samples.astype(int)))
 
@@ -180,11 +171,12 @@ class Solution(Measured, Shown):
 
     def _evaluate(self) -> outputs.Records:
         """Solve the index-1 system at every output time."""
-        if self._shared is not None:
-            evaluator, room = self._shared
-            records = room.first(self.t.size) if self.t.size <= len(room.pose) else self._new_records(self.t.size)
+        shared = self._shared
+        evaluator = self._evaluator() if shared is None else shared.evaluator
+        if shared is None or self.t.size > shared.size:
+            records = self._new_records(self.t.size)
         else:
-            evaluator, records = self._evaluator(), self._new_records(self.t.size)
+            records = shared.room.first(self.t.size)
         self._fill(evaluator, records)
         return records
 
@@ -351,8 +343,8 @@ class Solution(Measured, Shown):
         room: outputs.Records | None = None
         if known is None:
             most = min(size, rows.size)
-            if self._shared is not None and most <= len(self._shared[1].pose):
-                evaluator, room = self._shared
+            if self._shared is not None and most <= self._shared.size:
+                evaluator, room = self._shared.evaluator, self._shared.room
             else:
                 evaluator, room = self._evaluator(), self._new_records(most)
         for k in range(0, rows.size, size):
@@ -390,7 +382,9 @@ class Solution(Measured, Shown):
 
         They are to be asked in the order of time then.
         """
-        self._shared = (self._evaluator(), self._new_records(size))
+        # of a copy: the solution would hold itself otherwise
+        alone = copy.copy(self)
+        self._shared = Shared(alone._evaluator, alone._new_records, size)
 
     # --- access by name -----------------------------------------------------------------------------
 

@@ -182,8 +182,9 @@ class Told(OwnAttributes):
                 np.array([point.t]), point.y[None, :], [(0, point.idata)], self._held(point)[None, :]
             )
             # turns as the run counts them at every step
-            evaluator: Any = self._row._shared
-            evaluator[0].rdata[:] = self._run.state.rdata
+            shared = self._row._shared
+            assert shared is not None
+            shared.evaluator.rdata[:] = self._run.state.rdata
         return self._present
 
     def _joint_angle(self, joint: Any) -> float:

@@ -64,6 +64,10 @@ SIGNAL_TURNS = 5
 """Turns of the driver over which the acceleration is told, by repetition: what is made of it, such as synchronous
 averages and lines between whole turns, takes four and the ends of its filters."""
 
+KEPT = 64
+"""Mesh periods of a motion that has not repeated itself yet whose samples are kept, 2 MB; the samples of later ones are
+made again when the motion has been found to do so."""
+
 BEYOND = 0.02
 """Part of a mesh period by which a run goes beyond the end of one before it is looked at: the interpolation needs a
 step there."""
@@ -132,6 +136,7 @@ class PeriodicRecorder:
             sense=pair.rotation,
         )
         self._amplitudes = np.empty((0, HARMONICS, len(COMPONENTS)), dtype=complex)
+        self._samples = np.empty((0, SAMPLES, len(COMPONENTS)))
         self._watched = False
         self.found: Found | None = None
         self.deviation = self.scatter = math.nan
@@ -185,19 +190,30 @@ class PeriodicRecorder:
         t, components = columns.t, self._components(columns.forces[:, 3:6])
         edges = self._begin + (first + np.arange((stop - first) * SAMPLES + 1) / SAMPLES) / self._gmf
         between = slice(*np.searchsorted(t, edges[[0, -1]]))
-        places = np.searchsorted(edges, t[between])
-        times = np.insert(edges, places, t[between])
-        values = np.insert(monotone_cubic(t, components, edges), places, components[between], axis=0)
-        pieces = 0.5 * np.diff(times)[:, None] * (values[1:] + values[:-1])
-        integral = np.concatenate([np.zeros((1, len(COMPONENTS))), np.cumsum(pieces, axis=0)])
-        at_edges = integral[np.arange(edges.size) + np.searchsorted(t[between], edges)]
-        return np.diff(at_edges, axis=0) * (SAMPLES * self._gmf)
+        steps = t[between]
+        # where both stand among all
+        at_steps = np.searchsorted(edges, steps) + np.arange(steps.size)
+        is_edge = np.ones(edges.size + steps.size, dtype=bool)
+        is_edge[at_steps] = False
+        (at_edges,) = np.nonzero(is_edge)
+        times = np.empty(is_edge.size)
+        times[at_steps], times[at_edges] = steps, edges
+        means = np.empty((len(COMPONENTS), edges.size - 1))
+        column, integral = np.empty(is_edge.size), np.zeros(is_edge.size)
+        half = 0.5 * np.diff(times)
+        for mean, of_steps, of_edges in zip(means, components[between].T, monotone_cubic(t, components, edges).T):
+            column[at_steps], column[at_edges] = of_steps, of_edges
+            np.cumsum(half * (column[1:] + column[:-1]), out=integral[1:])
+            mean[:] = np.diff(integral[at_edges])
+        return means.T * (SAMPLES * self._gmf)
 
     def _add(self, whole: int) -> None:
         """Take the amplitudes of mesh periods that are complete."""
         known = len(self._amplitudes)
         if whole > known:
             values = self._values(known, whole).reshape(whole - known, SAMPLES, len(COMPONENTS))
+            if whole <= KEPT:
+                self._samples = np.concatenate([self._samples, values])
             lines = np.fft.rfft(values, axis=1)[:, 1 : HARMONICS + 1]
             self._amplitudes = np.concatenate([self._amplitudes, lines * (2.0 / SAMPLES)])
 
@@ -265,7 +281,12 @@ class PeriodicRecorder:
         """
         assert self.found is not None
         first, periods = self.found
-        lines = np.fft.rfft(self._values(first, first + periods), axis=0)
+        last = first + periods
+        if last <= len(self._samples):
+            values = self._samples[first:last].reshape(-1, len(COMPONENTS))
+        else:
+            values = self._values(first, last)
+        lines = np.fft.rfft(values, axis=0)
         levels = np.abs(lines) * (math.sqrt(2.0) / (periods * SAMPLES))
         orders = levels[periods * np.arange(1, HARMONICS + 1)]
         bands = bands_of_lines(self.case, periods, levels.__getitem__)

@@ -6,14 +6,15 @@ import functools
 import json
 import platform
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 import gearmbs
-from gearmbs._lazy import spare_duck_arrays
+from gearmbs._lazy import spare_duck_arrays, uncollected
 from gearmbs.dae.results.solution import Solution
 from gearmbs.signals import even_signal, make_signal
 from gearmbs.signals.conversion import COMPONENTS, component_values
@@ -54,22 +55,84 @@ def check_variables(variables: Collection[str] | None) -> None:
             raise CaseError(f"variables: {name!r} is unknown; choose of {', '.join(VARIABLES)}")
 
 
+Parts = tuple[dict[str, Any], dict[str, Any]]
+"""Variables and coordinates of a dataset, as it takes them: dimensions, values and attributes."""
+
+
+@dataclass
+class PlainRecord:
+    """What a record holds, as plain arrays: whoever asks for a number of it loads no xarray.
+
+    Attributes
+    ----------
+    data, coords : dict
+        Variables and coordinates, as `xarray.Dataset` takes them.
+    told : dict
+        What the run says of the record, besides what its case and its solver do.
+    """
+
+    case: Case
+    solution: Solution
+    data: dict[str, Any]
+    coords: dict[str, Any]
+    told: dict[str, Any] = field(default_factory=dict)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.data
+
+    def values(self, name: str) -> np.ndarray:
+        """Return the values of a variable or of a coordinate."""
+        found = self.data[name] if name in self.data else self.coords[name]
+        return np.asarray(found[1] if isinstance(found, tuple) else found)
+
+    def dataset(self) -> xr.Dataset:
+        """Return the record of `gearmbs.studies.run_case`."""
+        # the first one loads xarray and what xarray loads
+        with uncollected():
+            dataset = _dataset(self.data, self.coords)
+        dataset.attrs = attributes_of(self.case, self.solution) | self.told
+        return dataset
+
+
+def values_of(record: PlainRecord | xr.Dataset, name: str) -> np.ndarray:
+    """Return the values of a variable or of a coordinate of a record, with dimensions in the order of `evaluate`."""
+    return record.values(name) if isinstance(record, PlainRecord) else record[name].values
+
+
+def told_of(record: PlainRecord | xr.Dataset) -> Mapping[Any, Any]:
+    """Return what a run says of its record; of a dataset all attributes."""
+    return record.told if isinstance(record, PlainRecord) else record.attrs
+
+
+def _dataset(data: dict[str, Any], coords: dict[str, Any]) -> xr.Dataset:
+    import pandas as pd
+    import xarray as xr
+
+    spare_duck_arrays()
+    if "time" in coords:
+        # the times as they are, not a copy of them
+        dims, t, attributes = coords["time"]
+        coords = coords | {"time": (dims, pd.Index(t, copy=False), attributes)}
+    return xr.Dataset(data, coords=coords)
+
+
 def evaluate(
     case: Case,
-    known: Measured,
+    known: Measured | None,
     *,
     even: bool,
     variables: Collection[str] | None = None,
     span: Span | None = None,
     signal_stop: float | None = None,
     levels: np.ndarray | None = None,
-) -> xr.Dataset:
-    """Return variables of a case's record, without attributes; see `gearmbs.studies.run_case`.
+) -> Parts:
+    """Return variables of a case's record and their coordinates; see `gearmbs.studies.run_case`.
 
     Parameters
     ----------
-    known : Measured
-        At the output rate, or at uneven times that are brought to it through an anti-alias filter.
+    known : Measured or None
+        At the output rate, or at uneven times that are brought to it through an anti-alias filter. None if nothing is
+        wanted but levels that are known.
     even : bool
         Which of the two.
     variables : collection of str, optional
@@ -81,15 +144,13 @@ def evaluate(
     levels : ndarray, shape (2, harmonics, components), optional
         RMS of the mesh harmonics by band and by orders, if they are known; default from the acceleration.
     """
-    import xarray as xr
-
-    spare_duck_arrays()
-
     level = LEVELS[0 if case.operation.speed_curve is None else 1]
     wanted = set(VARIABLES if variables is None else variables) - (set(LEVELS) - {level})
     start, stop = span or span_of(case)
     signal_stop = stop if signal_stop is None else signal_stop
     made = wanted - {"gmf_rms"} if levels is not None else wanted
+    if known is None:
+        return _levels_alone(case, levels, wanted)
     if even:
         first = int(np.searchsorted(known.t, start - case.edge - 0.5 / case.output_rate))
         contact = {name: values[first:] for name, values in known.contact.items()}
@@ -119,11 +180,20 @@ def evaluate(
             data[level], of_levels = mesh_levels(case, acceleration)
         elif level in made:
             data[level] = tracked_levels(case, acceleration, turning)
-    return xr.Dataset(data, coords={**coords, **of_levels})
+    return data, {**coords, **of_levels}
 
 
-Parts = tuple[dict[str, Any], dict[str, Any]]
-"""Variables and coordinates of a dataset, as it takes them."""
+def _levels_alone(case: Case, levels: np.ndarray | None, wanted: Collection[str]) -> Parts:
+    """Return the RMS of the mesh harmonics that are known, if they are wanted, and nothing else."""
+    if levels is None or "gmf_rms" not in wanted:
+        return {}, {}
+    variable, coords = level_parts(levels, np.array(COMPONENTS), case.mesh_frequency)
+    return {"gmf_rms": variable}, coords
+
+
+def needs_series(variables: Collection[str]) -> bool:
+    """Return whether any of some variables is made from what was measured over time, where levels are known."""
+    return bool(set(variables) - set(LEVELS))
 
 
 class _EvenForces(NamedTuple):
@@ -193,15 +263,11 @@ def _even_times(case: Case, known: Measured, start: float, stop: float, *, even:
 
 def time_series(t: np.ndarray, values: dict[str, np.ndarray]) -> xr.Dataset:
     """Return the dataset of variables over time, whichever of `SERIES` there are; numbers of teeth are integers."""
-    import xarray as xr
-
-    return xr.Dataset(*_parts_over_time(t, values))
+    return _dataset(*_parts_over_time(t, values))
 
 
 def _parts_over_time(t: np.ndarray, values: dict[str, np.ndarray]) -> Parts:
     """Return variables and coordinates of `time_series`."""
-    import pandas as pd
-
     units = {**SMOOTH, **COUNTS, "transmission_error": "m"}
     long_names = {"transmission_error": "lag of the driven wheel at its base circle"}
     data: dict[str, Any] = {}
@@ -216,8 +282,7 @@ def _parts_over_time(t: np.ndarray, values: dict[str, np.ndarray]) -> Parts:
             text = long_names.get(name, name.replace("_", " "))
             series = values[name].astype(np.int16, copy=False) if name in COUNTS else values[name]
             data[name] = ("time", series, {"units": units[name], "long_name": text})
-    # the times as they are, not a copy of them
-    coords: dict[str, Any] = {"time": ("time", pd.Index(t, copy=False), {"units": "s"})}
+    coords: dict[str, Any] = {"time": ("time", t, {"units": "s"})}
     if any(name in data for name in FORCES):
         coords["xyz"] = ["x", "y", "z"]
     return data, coords
@@ -293,13 +358,18 @@ def _version(package: str) -> str:
     return version(package) if own is None else own
 
 
+def title_of(case: Case) -> str:
+    """Return the title of a case's record."""
+    return f"gear pair: {case.name}"
+
+
 def attributes_of(case: Case, solution: Solution | None = None) -> dict[str, Any]:
     """Return every parameter of a case, the versions and the solver's statistics as flat attributes.
 
     The unit of a quantity is beside it: ``operation_speed`` has ``operation_speed_units``. What is unusual about the
     case is said in ``remarks``.
     """
-    out: dict[str, Any] = {"title": f"gear pair: {case.name}", "case": case.name}
+    out: dict[str, Any] = {"title": title_of(case), "case": case.name}
     for section in ("gears", "shafts", "operation", "fault", "contact", "friction", "solver"):
         settings = getattr(case, section)
         units = units_of_fields(settings)

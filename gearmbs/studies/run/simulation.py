@@ -23,11 +23,14 @@ from gearmbs.studies.run.accuracy import Recorded, accurate_record
 from gearmbs.studies.run.periodic import Found, PeriodicRecorder, Precision, reach, signal_stop
 from gearmbs.studies.run.record import (
     VARIABLES,
+    PlainRecord,
     attributes_of,
     bearing_attributes,
     check_variables,
     evaluate,
+    needs_series,
     time_series,
+    title_of,
 )
 from gearmbs.studies.run.recorder import WATCHED, Measured, Recorder, Separations, measure, rows_of_record, slip
 
@@ -297,17 +300,38 @@ def run_case(
     misplaced: dict[str, Any] = {**settings}
     for name, value in misplaced.items():
         raise CaseError(_misplaced(name, value))
+    if accuracy is None:
+        return plain_record(case, progress, mechanism=mechanism, variables=variables).dataset()
+
+    def run(case: Case, variables: Collection[str] | None, precision: Precision | None = None) -> Recorded:
+        plain, found = _recorded(case, progress, mechanism, variables, precision)
+        return Recorded(plain.dataset(), found)
+
+    _check(case, variables)
+    return accurate_record(run, case, accuracy, variables, mechanism)
+
+
+def plain_record(
+    case: Case,
+    progress: bool | Callable[[float], None] | None = None,
+    *,
+    mechanism: Mechanism | None = None,
+    variables: Collection[str] | None = None,
+) -> PlainRecord:
+    """Simulate a case and return its record as plain arrays, for who asks for numbers of it; see `run_case`.
+
+    A record of levels alone that is as long as its motion takes loads no xarray.
+    """
+    _check(case, variables)
+    return _recorded(case, progress, mechanism, variables, None)[0]
+
+
+def _check(case: Case, variables: Collection[str] | None) -> None:
+    """Refuse what is no case, or has no record, and names that are no variables of one."""
     if not isinstance(case, Case):
         raise CaseError(f"case: is a {type(case).__name__}; make a case of tables by make_case, of a file by load_case")
     check_record(case)
     check_variables(variables)
-
-    def run(case: Case, variables: Collection[str] | None, precision: Precision | None = None) -> Recorded:
-        return _recorded(case, progress, mechanism, variables, precision)
-
-    if accuracy is not None:
-        return accurate_record(run, case, accuracy, variables, mechanism)
-    return run(case, variables).record
 
 
 def _recorded(
@@ -316,8 +340,8 @@ def _recorded(
     mechanism: Mechanism | None,
     variables: Collection[str] | None,
     precision: Precision | None,
-) -> Recorded:
-    """Simulate a case that has been checked, and return its record; see `run_case`."""
+) -> tuple[PlainRecord, Found | None]:
+    """Simulate a case that has been checked; return its record and which mesh periods it is of, see `Recorded`."""
     load_kernels(case.solver.integrator, case.lump)
     # what rolls in bearings does not come back with the teeth
     known_period = mechanism is None and case.shafts.bearings is None
@@ -344,18 +368,18 @@ def _recorded(
     try:
         if periodic is None or periodic.found is None:
             measured, even = recorder.measured(), recorder.is_even
-            dataset = _evaluated(case, solution, measured, recorder.slipped, even=even, variables=variables)
+            plain = _evaluated(case, solution, measured, recorder.slipped, even=even, variables=variables)
         else:
-            dataset = evaluated_period(case, solution, periodic, variables)
+            plain = evaluated_period(case, solution, periodic, variables)
     except SimulationFailed as failure:
         known = _partial(case, solution, recorder, mechanism)
         raise SimulationFailed(str(failure), solution, case, known) from None
-    dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
+    plain.told |= bearing_attributes(mechanism, title_of(case))
     if periodic is not None:
-        dataset.attrs |= periodic.attributes()
+        plain.told |= periodic.attributes()
     if apart is not None:
-        dataset.attrs["record_apart"] = apart.share
-    return Recorded(dataset, None if periodic is None else periodic.found or Found(0, 0))
+        plain.told["record_apart"] = apart.share
+    return plain, None if periodic is None else periodic.found or Found(0, 0)
 
 
 def _misplaced(name: str, value: Any) -> str:
@@ -423,9 +447,9 @@ def record(case: Case, solution: Solution, mechanism: Mechanism | None = None) -
     """
     known = measure(case, solution, rows_of_record(case, solution.t))
     slipped = slip(case.pair(), known.t, known.error)
-    dataset = _evaluated(case, solution, known, slipped, even=_is_even(solution.t, case.output_rate))
-    dataset.attrs |= bearing_attributes(mechanism, dataset.attrs["title"])
-    return dataset
+    plain = _evaluated(case, solution, known, slipped, even=_is_even(solution.t, case.output_rate))
+    plain.told |= bearing_attributes(mechanism, title_of(case))
+    return plain.dataset()
 
 
 def _evaluated(
@@ -436,35 +460,33 @@ def _evaluated(
     *,
     even: bool,
     variables: Collection[str] | None = None,
-) -> xr.Dataset:
+) -> PlainRecord:
     """Return the record of what was measured, at even times or not; see `record`."""
     _check_slip(case, solution, slipped)
-    # the first one loads xarray and what xarray loads
+    # signals load xarray and what xarray loads
     with uncollected():
-        dataset = evaluate(case, known, even=even, variables=variables)
-    dataset.attrs = attributes_of(case, solution)
-    return dataset
+        return PlainRecord(case, solution, *evaluate(case, known, even=even, variables=variables))
 
 
 def evaluated_period(
     case: Case, solution: Solution, periodic: PeriodicRecorder, variables: Collection[str] | None
-) -> xr.Dataset:
+) -> PlainRecord:
     """Return the record of a motion that repeats itself; its acceleration lasts for some turns of the driver."""
     _check_slip(case, solution, periodic.recorder.slipped)
     span, wanted = periodic.span, VARIABLES if variables is None else variables
     levels = periodic.levels() if "gmf_rms" in wanted else None
+    known = periodic.measured(reach(case, span)) if needs_series(wanted) else None
     with uncollected():
-        dataset = evaluate(
+        parts = evaluate(
             case,
-            periodic.measured(reach(case, span)),
+            known,
             even=False,
             variables=variables,
             span=span,
             signal_stop=signal_stop(case, span),
             levels=levels,
         )
-    dataset.attrs = attributes_of(case, solution)
-    return dataset
+    return PlainRecord(case, solution, *parts)
 
 
 def _check_slip(case: Case, solution: Solution, slipped: str | None) -> None:

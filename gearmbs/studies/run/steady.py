@@ -153,10 +153,9 @@ def steady_case(case: Case, *, variables: Collection[str] | None = None, most: i
     solution = posed.solution(orbit)
     found = round(orbit.period * case.mesh_frequency)
     recorder = period_recorder(case, solution, found, orbit.error)
-    dataset = evaluated_period(case, solution, recorder, variables)
-    dataset.attrs |= recorder.attributes()
-    dataset.attrs["orbit_multiplier"] = orbit.decay
-    return SteadyCase(solution, orbit, posed.state(orbit), dataset)
+    plain = evaluated_period(case, solution, recorder, variables)
+    plain.told |= recorder.attributes() | {"orbit_multiplier": orbit.decay}
+    return SteadyCase(solution, orbit, posed.state(orbit), plain.dataset())
 
 
 def posed_case(case: Case) -> tuple[Case, Posed, AtValue, float]:
