@@ -1,6 +1,7 @@
 """What a mesh, a body and a mesh cycle of a drivetrain cost: the bench beside its first pair, and stages in line.
 
     python -m benchmarks.trains --repeats 5
+    python -m benchmarks.trains --equally-accurate
 
 All models run in turn in one process, so that a busy machine slows all of them alike; what counts are processor times
 and the medians of ratios within a turn.
@@ -12,7 +13,7 @@ import argparse
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,11 @@ STAGES = (1, 2, 5, 10)
 TURNING = (1, 10, 20, 30)
 """Stages whose shafts are integrated by their angles alone."""
 ALONE = ", angles alone"
+TOLERANCES = (5e-8, 1e-7, 2e-7, 4e-7, 8e-7)
+"""Tolerances between which the one is found at which lines of stages are as accurate as one stage at `USUAL`."""
+USUAL, EXACT = 1e-7, 1e-10
+CYCLES, SAMPLES = 40, 60
+"""Mesh cycles at the end of a run whose harmonics are compared, and samples of each."""
 
 
 def stages_in_line(count: int) -> Any:
@@ -127,14 +133,70 @@ def render(rows: list[dict[str, Any]], span: float = SPAN) -> str:
     )
 
 
+def harmonics_of(m: Any, count: int, scale: float, tol: float, span: float) -> tuple[np.ndarray, float]:
+    """Return the first three mesh harmonics of each mesh's normal force, N, (count, 3), and the processor time, s."""
+    start = time.process_time()
+    solution = m.simulate(span, rate=SAMPLES * scale / (2.0 * math.pi), tol=tol, rate_scale=scale)
+    spent = time.process_time() - start
+    told = np.array([solution.contact(f"m{k}")["normal_force"] for k in range(count)])
+    lines = np.fft.rfft(told[:, -CYCLES * SAMPLES - 1 : -1], axis=1)[:, CYCLES * np.arange(1, 4)]
+    return 2.0 * np.abs(lines) / (CYCLES * SAMPLES), spent
+
+
+def equally_accurate(
+    repeats: int, span: float = SPAN, report: Callable[[str], None] = print, counts: Sequence[int] = TURNING
+) -> list[dict[str, float]]:
+    """Return a row a line of stages whose angles alone are integrated: cost at one tolerance, and at one error.
+
+    The error is that of the first three harmonics of the worst mesh, as a part of its largest, against `EXACT`. The
+    tolerance of one error is found between those tried, on logarithmic scales, and the time at it as well.
+    """
+    rows, wanted = [], None
+    for count in counts:
+        train = stages_in_line(count)
+        m = train.build()
+        m.lump = True
+        exact, _ = harmonics_of(m, count, train.rate_scale, EXACT, span)
+        errors, spent = [], []
+        for tol in TOLERANCES:
+            runs = [harmonics_of(m, count, train.rate_scale, tol, span) for _ in range(repeats)]
+            errors.append(float((np.abs(runs[0][0] - exact).max(axis=1) / exact.max(axis=1)).max()))
+            spent.append(float(np.median([seconds for _, seconds in runs])))
+        usual = TOLERANCES.index(USUAL)
+        wanted = errors[usual] if wanted is None else wanted
+        # errors rise with the tolerance, but not by every step of it
+        rising = np.maximum.accumulate(errors)
+        tol = float(np.exp(np.interp(np.log(wanted), np.log(rising), np.log(TOLERANCES))))
+        equal = float(np.exp(np.interp(np.log(tol), np.log(TOLERANCES), np.log(spent))))
+        rows.append({"meshes": count, "error": errors[usual], "seconds": spent[usual], "tol": tol, "equal": equal})
+        report(f"{count} stages: {rows[-1]}")
+    return rows
+
+
+def render_equally(rows: list[dict[str, float]]) -> str:
+    """Return the table in Markdown, and the exponents from ten stages on."""
+    header = ["stages", f"error at {USUAL:g}", "s", "tolerance of the first one's error", "s at it"]
+    cells = [[number(row[key]) for key in ("meshes", "error", "seconds", "tol", "equal")] for row in rows]
+    many = [row for row in rows if row["meshes"] >= 10]
+    one, other = (
+        float(np.polyfit(np.log([row["meshes"] for row in many]), np.log([row[key] for row in many]), 1)[0])
+        for key in ("seconds", "equal")
+    )
+    return table(header, cells) + f"\nFrom ten on: power {one:.2f} at one tolerance, {other:.2f} at one error.\n"
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--span", type=float, default=SPAN, help="simulated time of each run, s")
+    parser.add_argument("--equally-accurate", action="store_true", help="lines of stages at one error")
     given = parser.parse_args()
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    if given.equally_accurate:
+        print(render_equally(equally_accurate(given.repeats, given.span)))
+        return
     print(render(measure(given.repeats, given.span), given.span))
 
 

@@ -1,5 +1,7 @@
 """The cost of drivetrains: what its table says."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from benchmarks import trains
@@ -25,3 +27,26 @@ def test_every_model_is_measured():
     assert [row["model"] for row in rows][:3] == ["healthy pair", "bench, joints", "bench, elastic bearings"]
     assert rows[0]["ratio"] == 1.0
     assert [row["meshes"] for row in rows if row["model"].endswith(trains.ALONE)] == list(trains.TURNING)
+
+
+def test_cost_at_one_error_lies_between_tolerances(monkeypatch):
+    """Errors as tol / n^0.5 and times as n tol^-0.2: at the error of one stage n take n^0.9 of its time."""
+
+    def harmonics(m, count, scale, tol, span):
+        off = 0.0 if tol == trains.EXACT else 1e3 * tol / count**0.5
+        return (1.0 + off) * trains.np.ones((count, 3)), count * tol**-0.2
+
+    monkeypatch.setattr(trains, "harmonics_of", harmonics)
+    train = SimpleNamespace(rate_scale=1.0, build=SimpleNamespace)
+    monkeypatch.setattr(trains, "stages_in_line", lambda count: train)
+    rows = trains.equally_accurate(1, report=lambda text: None, counts=(1, 10, 12))
+    assert [row["tol"] for row in rows] == pytest.approx([1e-7, 10**0.5 * 1e-7, 12**0.5 * 1e-7])
+    assert rows[1]["equal"] == pytest.approx(10.0**0.9 * rows[0]["equal"])
+    assert "From ten on: power 1.00 at one tolerance, 0.90 at one error." in trains.render_equally(rows)
+
+
+@pytest.mark.slow
+def test_lines_of_stages_are_compared_at_one_error():
+    (row,) = trains.equally_accurate(1, 0.11, report=lambda text: None, counts=(1,))
+    assert 1e-5 < row["error"] < 5e-3
+    assert row["tol"] > 0.999 * trains.USUAL
