@@ -452,7 +452,34 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         return add_friction(self, name, joint, friction_of(name, mu_static, mu_dynamic, {**parameters}, self.units))
 
     def general_constraint(self, name: str, expression: str) -> None:
-        """Demand that an expression of positions and time vanish (ADAMS's GCON)."""
+        """Demand that an expression of positions and time vanish (ADAMS's GCON).
+
+        `Solution.reaction` tells what it exerts on the body of the first marker that the expression names, about that
+        marker's origin. Derivatives of motions and reactions by the parameters in it are exact.
+
+        Parameters
+        ----------
+        name : str
+        expression : str
+            In the function language, of displacements of markers, angles, parameters, functions and TIME, in the
+            mechanism's units.
+
+        Raises
+        ------
+        ModelError
+            For a name that is in use; when the mechanism is compiled for an expression that cannot be read, or that
+            asks for velocities, forces or states.
+
+        Examples
+        --------
+        >>> from gearmbs.mechanism import Mechanism
+        >>> m = Mechanism("bead")
+        >>> bead = m.body("bead", mass=2.0, inertia=(1e-3, 1e-3, 1e-3), position=(0.3, 0, 0), velocity=(0, 1, 0))
+        >>> place, centre = bead.marker(name="I"), m.ground.marker(name="G")
+        >>> m.general_constraint("hoop", "DX(I,G)**2 + DY(I,G)**2 - 0.3**2")
+        >>> print(m.simulate(0.1).reaction("hoop")[0][0].round(2) + 0.0)
+        [-6.67  0.    0.  ]
+        """
         self._check_name(name)
         self.constraints[name] = str(expression)
 

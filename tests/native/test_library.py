@@ -390,3 +390,17 @@ def test_what_cannot_be_exported_is_refused(tmp_path):
     instance.advance(0.5)
     # 2 w' = 4
     assert instance.get("speed") == pytest.approx(1.0, rel=1e-6)
+
+
+def test_a_constraint_given_by_an_expression(tmp_path):
+    """A bead on a hoop of 0.3 m about the origin at 1 m/s: F = -m v^2 / r^2 (x, y)."""
+    m = gm.Mechanism("bead")
+    ball = m.body("ball", mass=2.0, inertia=(1e-3, 1e-3, 1e-3), position=(0.3, 0.0, 0.0), velocity=(0, 1.0, 0))
+    ball.marker(name="I")
+    m.ground.marker(name="G")
+    m.general_constraint("hoop", "DX(I,G)**2 + DY(I,G)**2 - 0.09")
+    asked = [("reaction", "hoop", "fx"), ("reaction", "hoop", "fy"), *(("com_position", "ball", c) for c in "xy")]
+    instance = Instance(Library(export(m, tmp_path, t_end=1.0, outputs=asked, processor="native", tol=1e-9).library))
+    instance.advance(0.4)
+    told = np.array(instance.outputs())
+    np.testing.assert_allclose(told[:2], -2.0 / 0.09 * told[2:], atol=1e-6)

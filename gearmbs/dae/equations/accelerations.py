@@ -461,12 +461,52 @@ def has_reactions(tab):
 # What is recorded of an output beside accelerations: the reactions of constraint rows, and the poses of bodies.
 
 
+@njit(types.void(I8, F8, F8, VEC, T.TABLES, VEC, VEC), cache=True, late=True, error_model="numpy")
+def load_of_tape(k, lam, t, y, tab, force, moment):
+    """Add what a row given by tape k exerts on the body of the first marker that it names.
+
+    Of the ground, what all others feel with the opposite sign: the expression stays what it is where all move together.
+
+    Parameters
+    ----------
+    k : int
+        Tape Phi.
+    lam : float
+        The row's multiplier.
+    t, y, tab : float, ndarray, Tables
+        Time, s, the unknowns, and the tables that are up to date with them.
+    force, moment : ndarray, shape (3,)
+        -lambda Phi_R, N, and -lambda (Phi_pi + (R - P_I) x Phi_R), N m, about the marker's origin P_I, added; global.
+    """
+    row = tab.tape[k]
+    first, bodies = row[T.TAPE_BODIES], row[T.TAPE_N_BODIES]
+    i = tab.extra_i[first + bodies + row[T.TAPE_N_UNKNOWNS]]
+    if i < 0:
+        return
+    grad = expressions.tail(tab, expressions.gradient_size(row))
+    expressions.gradient(k, t, y, tab, grad)
+    s = vector_at(tab.scratch, S_VECTOR, 6)
+    of_i = tab.marker_body[i]
+    factor = -lam if of_i > 0 else lam
+    for p in range(bodies):
+        b = tab.extra_i[first + p]
+        # frames of one body that deforms have its place among the unknowns
+        if of_i > 0 and tab.at[b, T.AT_U] != tab.at[of_i, T.AT_U]:
+            continue
+        for c in range(3):
+            s[c] = tab.kin[b, KIN_R + c] - tab.kin[of_i, KIN_R + c] - tab.frame[i, T.MK_ARM + c]
+        terms.cross3(s, 0, grad, 12 * p, s, 3)
+        for c in range(3):
+            force[c] += factor * grad[12 * p + c]
+            moment[c] += factor * (grad[12 * p + 3 + c] + s[3 + c])
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)
-def loads_of_rows(multipliers, idata, tab, force, moment):
+def loads_of_rows(multipliers, t, y, idata, tab, force, moment):
     """Write the reaction of each constraint row on I's body: force, and moment about the origin of marker I, global.
 
     The kinematics tables must be up to date. Of a row that couples several joints, the part that acts through the
-    first one's marker I.
+    first one's marker I; of one given by an expression, that of `load_of_tape`.
     """
     g = vector_at(tab.scratch, S_GRADIENT, 12)
     gt = vector_at(tab.scratch, S_GRADIENT_T, 12)
@@ -499,6 +539,8 @@ def loads_of_rows(multipliers, idata, tab, force, moment):
             terms.cross3(tab.frame[tab.term[j, T.TERM_I]], T.MK_ARM, s, 0, s, 3)
             for c in range(3):
                 moment[r, c] += factor * g[3 + c] - s[3 + c]
+        if tab.row[r, T.ROW_TAPE] >= 0:
+            load_of_tape(tab.row[r, T.ROW_TAPE], lam, t, y, tab, force[r], moment[r])
 
 
 @njit(
@@ -507,8 +549,8 @@ def loads_of_rows(multipliers, idata, tab, force, moment):
     error_model="numpy",
 )
 def joint_loads(y, idata, rdata, work, multipliers, force, moment):
-    """Write the loads of `loads_of_rows`; ``multipliers[0]`` holds lambda."""
-    loads_of_rows(multipliers[0], idata, T.unpack(idata, rdata, work), force, moment)
+    """Write the loads of `loads_of_rows`; ``multipliers[0]`` holds lambda, ``multipliers[1, 0]`` the time, s."""
+    loads_of_rows(multipliers[0], multipliers[1, 0], y, idata, T.unpack(idata, rdata, work), force, moment)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

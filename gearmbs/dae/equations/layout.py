@@ -216,7 +216,7 @@ TAPE_R_SIZE = 3
 TAPE_REFERENCE = 4
 TAPE_REFERENCE_SIZE = 5
 TAPE_BODIES = 6
-"""Offset in the extra integers of the bodies, then the unknowns, the tape depends on."""
+"""Offset in the extra integers of the bodies, then the unknowns, the tape depends on; then its first marker or -1."""
 TAPE_N_BODIES = 7
 TAPE_N_UNKNOWNS = 8
 TAPE_ADDRESS = 9

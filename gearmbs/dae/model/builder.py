@@ -151,7 +151,7 @@ class TableBuilder:
         """Add an expression, a `Tape` whose unknowns are bound to indices of y; return its number."""
         bodies = len(self.extra_i)
         unknowns = tape.ints[tape.ints[HEAD_ALGEBRAIC_LIST] :][: len(tape.algebraic)]
-        self.extra_i.extend([*tape.bodies, *(int(k) for k in unknowns)])
+        self.extra_i.extend([*tape.bodies, *(int(k) for k in unknowns), tape.first_marker])
         i = len(self.extra_i)
         self.extra_i.extend(int(v) for v in tape.ints)
         r = len(self.extra_r)

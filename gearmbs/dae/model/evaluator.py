@@ -115,13 +115,15 @@ def project(t, at, phi, plan, factors, pair, idata, tab):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def write_row(k, at, multipliers, forces, moments, pose, idata, tab):
+def write_row(k, t, at, multipliers, forces, moments, pose, idata, tab):
     """Write reactions and pose of one row of the records.
 
     Parameters
     ----------
     k : int
         Row.
+    t : float
+        Its time, s.
     at, multipliers : ndarray
         Its unknowns, with which the tables are up to date, and its multipliers.
     forces, moments : ndarray
@@ -132,7 +134,7 @@ def write_row(k, at, multipliers, forces, moments, pose, idata, tab):
     """
     rows = idata[T.H_ROWS]
     force, moment = matrix_at(forces, 3 * rows * k, rows, 3), matrix_at(moments, 3 * rows * k, rows, 3)
-    loads_of_rows(multipliers, idata, tab, force, moment)
+    loads_of_rows(multipliers, t, at, idata, tab, force, moment)
     poses(at, tab.at, tab.code, tab.kin, pose)
 
 
@@ -210,7 +212,7 @@ def _evaluate(
             if renew_reactions(at, vector_at(solution, base, rows), idata, tab) <= 1e-12:
                 break
         pose = vector_at(records.pose, width * k, width)
-        write_row(k, at, vector_at(solution, base, rows), forces, moments, pose, idata, tab)
+        write_row(k, t[k], at, vector_at(solution, base, rows), forces, moments, pose, idata, tab)
     return last
 
 

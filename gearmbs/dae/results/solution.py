@@ -459,7 +459,10 @@ class Solution(Measured, Shown):
     acceleration = former_name("acceleration", com_acceleration, "write com_acceleration")
 
     def reaction(self, joint: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return force (N) and moment about marker I's origin (N m) of a joint on I's body, each (m, 3), global."""
+        """Return force (N) and moment about marker I's origin (N m) of a joint on I's body, each (m, 3), global.
+
+        I of a general constraint is the first marker that its expression names.
+        """
         return self.reaction_force(joint), _sum_of_rows(self._records.moment, self._rows_of_joint(joint))
 
     def reaction_force(self, joint: str) -> np.ndarray:

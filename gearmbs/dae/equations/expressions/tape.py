@@ -31,6 +31,9 @@ _LEAF_LEVEL = {
     op.ANGULAR_ACCELERATION: op.LEVEL_ACCELERATION,
 }
 
+UNPLACED = (op.CONST, op.TIME, op.ALGEBRAIC, op.FORCE)
+"""Leaves that do not begin with a marker."""
+
 AlgebraicKey = tuple[Hashable, ...]
 """Name of an algebraic unknown, for instance ("joint", 1, 3) or ("diff", 2)."""
 
@@ -85,6 +88,13 @@ class Tape:
     def length(self) -> int:
         """Number of instructions."""
         return int(self.ints[op.HEAD_COUNT])
+
+    @property
+    def first_marker(self) -> int:
+        """Index of the first marker that a measure names, -1 without one: where a constraint's reaction is told."""
+        code = self.ints[self.ints[op.HEAD_CODE] :][: op.WIDTH * self.length].reshape(-1, op.WIDTH)
+        named = [int(c[1]) for c in code if c[0] <= op.LAST_LEAF and c[0] not in UNPLACED and c[1] >= 0]
+        return named[0] if named else -1
 
     @property
     def gradient_size(self) -> int:
