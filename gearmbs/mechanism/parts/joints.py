@@ -6,7 +6,7 @@ where *swapped* exchanges the roles of I and J.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Never
@@ -114,25 +114,35 @@ def homokinetic(i: Marker, j: Marker) -> Row:
 
 @dataclass(frozen=True)
 class JointKind:
-    """What there is to know of a kind of joint that needs nothing but its two markers.
+    """What there is to know of a kind of joint that needs nothing but its two markers, and numbers.
 
     Attributes
     ----------
     rows : callable
-        ``rows(i, j)`` returns the constraint rows.
+        ``rows(i, j, **numbers)`` returns the constraint rows.
     angle, displacement : bool
         Whether I turns about z_J, or moves along it, in a way that can be counted and measured.
     crossed : bool
         Whether z_I and z_J are at right angles.
     adams : tuple of str, optional
         Statement and type in an ADAMS deck, as ``("JOINT", "REVOLUTE")``.
+    numbers : mapping of str to str
+        Units of the numbers that the rows take by name, as ``{"radius": "m"}``.
     """
 
-    rows: Callable[[Marker, Marker], list[Row]]
+    rows: Callable[..., list[Row]]
     angle: bool = False
     displacement: bool = False
     crossed: bool = False
     adams: tuple[str, str] | None = None
+    numbers: Mapping[str, str] = field(default_factory=dict)
+
+    def read(self, label: str, given: Mapping[str, QuantityLike]) -> dict[str, float]:
+        """Return the numbers of a joint in SI; raise a ModelError for one that is missing or unknown."""
+        if given.keys() != self.numbers.keys():
+            takes = ", ".join(f"{name} ({unit})" for name, unit in self.numbers.items()) or "none"
+            raise ModelError(f"{label}: numbers = {dict(given)}; it takes {takes}, as numbers={{name: value}}")
+        return {name: quantity(given[name], unit, f"{label}: {name}") for name, unit in self.numbers.items()}
 
 
 JOINTS: dict[str, JointKind] = {
@@ -163,7 +173,7 @@ JOINTS: dict[str, JointKind] = {
     "forks": JointKind(lambda i, j: [axes_normal(i, j, X, Y)]),
     "perpendicular": JointKind(lambda i, j: [axes_normal(i, j, Z, Z)], crossed=True, adams=("JPRIM", "PERPENDICULAR")),
 }
-"""The joints and primitives that need nothing but their two markers, by the name of their kind."""
+"""The joints and primitives that need nothing but their two markers, and numbers, by the name of their kind."""
 
 LARGEST_COSINE = 0.7
 """Largest cosine of the angle between two axes that are to be turned to right angles.
@@ -244,6 +254,7 @@ class JointMethods:
         at: Vector | None = None,
         axis: Vector | None = None,
         axis_j: Vector | None = None,
+        numbers: Mapping[str, QuantityLike] | None = None,
     ) -> Joint:
         """Add a joint of one of the kinds in :data:`gearmbs.mechanism.parts.joints.JOINTS`.
 
@@ -256,12 +267,14 @@ class JointMethods:
         axis_j : array_like, optional
             Axis on ``j`` at the initial position, at a right angle to ``axis``: for universal joints and the
             perpendicular primitive between bodies, which need two.
+        numbers : mapping, optional
+            Of a kind that takes some, as a radius: values by name, in SI or as text with a unit.
 
         Raises
         ------
         ModelError
-            For an unknown kind, a name in use, foreign bodies, a joint of a body with itself, or axes that should be at
-            right angles and are nearly parallel.
+            For an unknown kind, a name in use, foreign bodies, a joint of a body with itself, axes that should be at
+            right angles and are nearly parallel, or numbers that are missing or unknown.
         """
         if kind not in JOINTS:
             raise ModelError(f"joint '{name}': kind {kind!r} is unknown; choose one of {', '.join(JOINTS)}")
@@ -279,8 +292,9 @@ class JointMethods:
         with _markers_kept_if_added((mi, mj), (i, j)):
             if crossed:
                 check_crossed(label, mi, mj)
+            read = JOINTS[kind].read(label, numbers or {})
             try:
-                rows = JOINTS[kind].rows(mi, mj)
+                rows = JOINTS[kind].rows(mi, mj, **read)
             except ModelError:
                 raise
             except Exception as error:
