@@ -33,7 +33,7 @@ from gearmbs.dae.integrators.bdf import HISTORY, MAX_ORDER, error_constant
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, SingularMatrixError, analyse
 from gearmbs.dae.linalg.several import SIDES, solve_sides
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, factor, new_factors, solve
-from gearmbs.dae.problem import HISTORY_CHANGED, DAEProblem, ModelError
+from gearmbs.dae.problem import EPS, HISTORY_CHANGED, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult, DenseOutput, lagrange_weights
 from gearmbs.dae.tangent_jumps import look_for_jumps
 from gearmbs.dae.tangent_track import TRACK_TYPE, Track, size_of_move, slot_of
@@ -44,6 +44,10 @@ from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no
 BY = 1e-8
 """Part of a parameter's own scale, and of the rates along the past, by which the residual is moved: where it is not
 linear in both together this leaves 1e-8, and the rounding 1e-16/1e-8, of the terms."""
+NOTHING, ROUGH = 1e2 * EPS / BY, 1e-2
+"""Part of an unknown's largest value, or typical magnitude, up to which its sensitivity may be rounding: the residual is
+rounded to EPS of its terms, which are moved by `BY`, and steps add up to some of it. It is if it is rough, too: local
+errors are more than that part of it."""
 GROWTH, GROWING_ORDER = 1.4, 3
 """Ratio of a step to the one before it, and order, with which steps grow behind a restart: for ever at this ratio the
 formula of order three is stable up to 1.53, that of order four up to 1.28."""
@@ -358,7 +362,7 @@ class Followed:
         Of the unknowns and of their rates.
     error : ndarray, shape (p,)
         Largest local error of a step in any unknown under error control, as part of the largest value, both as parts of
-        the unknown's typical magnitude.
+        the unknown's typical magnitude; 0 where no such unknown depends on the parameter by more than rounding.
     """
 
     s: np.ndarray
@@ -468,9 +472,11 @@ def follow(
     idata, rdata, work = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
     plan: Any = None
     factors: Any = None
+    largest = tr.scale.copy()
     for begin in range(0, times.size, CHUNK):
         part = slice(begin, begin + CHUNK)
         y, yp = run.evaluate(times[part])
+        largest = np.maximum(largest, np.abs(y).max(axis=0))
         args = [np.ascontiguousarray(a[part]) for a in (times, looked, orders, flags)]
         at = 0
         while at < y.shape[0]:
@@ -493,6 +499,8 @@ def follow(
     tested = np.asarray(problem.error_mask, dtype=float) / tr.scale
     most = (tr.largest * tested).max(axis=1, initial=0.0)
     error = (tr.error * tested).max(axis=1, initial=0.0) / np.where(most > 0.0, most, 1.0)
+    depends = ((tr.largest > NOTHING * largest) & (tested > 0.0)).any(axis=1)
+    error[~depends & (error > ROUGH)] = 0.0
     shape = (outputs.size, count, n)
     return Followed(s_out.reshape(shape).swapaxes(0, 1), sp_out.reshape(shape).swapaxes(0, 1), error)
 

@@ -277,3 +277,17 @@ def test_jumps_inside_functions_of_python_are_seen():
     with pytest.raises(ModelError, match=says("'edge'", "jump")):
         forward_sensitivities(build, {"edge": 0.02}, 1.0, rate=100)
     assert forward_sensitivities(build, {"edge": 0.2}, 1.0, rate=100).solution.result.success
+
+
+def test_what_depends_on_nothing_of_a_parameter_has_no_error():
+    """A pendulum swings alike whatever its mass; what is left of its sensitivity is rounding."""
+
+    def pendulum(mass, length):
+        made = gm.Mechanism("pendulum", gravity=(0, 0, -9.81))
+        body = made.body("bob", mass=mass, inertia=(0.1 * mass,) * 3, position=(length, 0, 0))
+        made.revolute("pin", body, made.ground, at=(0, 0, 0), axis=(0, 1, 0))
+        return made
+
+    run = forward_sensitivities(pendulum, {"mass": 3.0, "length": 1.0}, 1.0, rate=50)
+    assert run.local_error["mass"] == 0.0
+    assert 0.0 < run.local_error["length"] < 1e-5

@@ -55,7 +55,8 @@ class Sensitivities:
         By parameter: dy/dp and dy'/dp at the outputs, in the order of the problem's unknowns.
     local_error : dict of float
         By parameter: the largest local error of a step of the variational equations, as part of the largest
-        value of the unknown; that of what is derived is larger by what steps add up to.
+        value of the unknown, 0 where none under error control depends on the parameter; that of what is derived is
+        larger by what steps add up to.
     """
 
     solution: Solution
