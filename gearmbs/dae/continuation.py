@@ -1,8 +1,8 @@
 """Branches of periodic orbits: from one to the next along a parameter, through turning points.
 
 With x the independent unknowns and p the parameter, orbits are the curve P(x, p) = x. It is followed by its arc length:
-z = (x, p) in units of its own sizes, a step ds along t, the secant of its last two points, and back onto it by Newton's method
-in the hyperplane across t (Keller's pseudo-arclength),
+z = (x, p) in units of its own sizes, a step ds along t, the secant of its last two points, and back onto it by Newton's
+method in the hyperplane across t (Keller's pseudo-arclength),
 
     [ M - 1   dP/dp ] [ dx ]     [ P - x                ]
     [   t_x     t_p ] [ dp ] = - [ t . (z - z_0) - ds   ].

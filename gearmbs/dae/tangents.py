@@ -45,9 +45,9 @@ BY = 1e-8
 """Part of a parameter's own scale, and of the rates along the past, by which the residual is moved: where it is not
 linear in both together this leaves 1e-8, and the rounding 1e-16/1e-8, of the terms."""
 NOTHING, ROUGH = 1e2 * EPS / BY, 1e-2
-"""Part of an unknown's largest value, or typical magnitude, up to which its sensitivity may be rounding: the residual is
-rounded to EPS of its terms, which are moved by `BY`, and steps add up to some of it. It is if it is rough, too: local
-errors are more than that part of it."""
+"""Part of an unknown's largest value, or typical magnitude, up to which its sensitivity may be rounding: the residual
+is rounded to EPS of its terms, which are moved by `BY`, and steps add up to some of it. It is if it is rough, too:
+local errors are more than that part of it."""
 GROWTH, GROWING_ORDER = 1.4, 3
 """Ratio of a step to the one before it, and order, with which steps grow behind a restart: for ever at this ratio the
 formula of order three is stable up to 1.53, that of order four up to 1.28."""
