@@ -169,11 +169,11 @@ def test_two_calls_share_the_cases(tmp_path, monkeypatch):
 def test_errors_can_be_kept(tmp_path, monkeypatch):
     """The case whose record is too short, the one that fails, and the sound one, each in its place."""
     monkeypatch.setattr(
-        "gearmbs.studies.run.recorder.slip", lambda case, *a: "the wheels slipped" if case.name == "slips" else None
+        "gearmbs.studies.run.recorder.slip", lambda pair, *a: "the wheels slipped" if pair.misalignment else None
     )
     cases = [
         Case(name="short", operation={**SHORT, "duration": 0.005}),
-        Case(name="slips", operation=SHORT),
+        Case(name="slips", operation=SHORT, fault={"misalignment": "0.1 deg"}),
         Case(name="sound", operation=SHORT),
     ]
     short, slips, sound = run_cases(cases, errors="keep", folder=tmp_path)
@@ -203,7 +203,7 @@ def test_the_paper_goes_on_where_it_stopped(tmp_path, monkeypatch):
     """Three cases are there from before; three are computed, and a full disk at the end costs nothing."""
     words = ["paper", "--out", str(tmp_path / "out"), "--duration", "80 ms", "--workers", "1"]
     with monkeypatch.context() as patch:
-        patch.setattr(recorder, "slip", lambda case, *a: "slipped" if case.operation.torque > 150.0 else None)
+        patch.setattr(recorder, "slip", lambda pair, *a: "slipped" if pair.operating_point.torque > 150.0 else None)
         result = CliRunner().invoke(cli.app, words)
     assert result.exit_code == 1
     assert len(list((tmp_path / "out" / "cases").glob("*load.nc"))) == 3
