@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gearmbs.bearings import Bearing, Spall
-from gearmbs.signals import SignalError, bearing_lines, combine_bearings, diagnose_bearing, make_signal
+from gearmbs.signals import SignalError, bearing_lines, combine_bearings, convert, diagnose_bearing, make_signal
 from gearmbs.signals.diagnosis.bearing_judgement import Evidence, Judged, chances_at, find_lines
 from gearmbs.signals.diagnosis.bearing_margins import agreed, answers_at, verdicts_of
 from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed, far_shaft, find_shaft
@@ -286,8 +287,29 @@ def test_quiet_lines_accuse_nothing_unless_asked_to():
     assert "stiffness that varies" in report.verdict
     assert report.tables()["bearing_evidence"]["modulated"].max() < 0.03
     assert diagnose_bearing(quiet, "6205", rpm(0.0), level=0.0).fault == "outer race"
-    volts = make_signal(quiet.values, RATE, channels=["case"], units="V")
-    assert diagnose_bearing(volts, "6205", rpm(0.0)).fault == "outer race"
+    volts = diagnose_bearing(make_signal(quiet.values, RATE, channels=["case"], units="V"), "6205", rpm(0.0))
+    assert volts.fault == "outer race"
+    assert any(re.search(says("CHECK THE LEVEL", "'case'", "in V"), note) for note in volts.notes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quantity", ["velocity", "displacement"])
+def test_velocities_and_displacements_have_the_level_of_their_acceleration(quantity):
+    """That of quiet lines does not accuse, that of loud ones does, also in the noise of an instrument."""
+    loud = record(pulses(LINES.bpfo * SHAFT, jitter=0.0), noise=1e-4)
+    before = diagnose_bearing(loud, "6205", rpm(0.0)).accused[0].modulated
+    moved = convert(loud, quantity, band=(10.0, 0.45 * RATE))
+    report = diagnose_bearing(moved, "6205", rpm(0.0))
+    assert report.fault == "outer race"
+    assert report.accused[0].modulated == pytest.approx(before, rel=0.1)
+    assert not any("LEVEL" in note for note in report.notes)
+    quiet = diagnose_bearing(moved.copy(data=1e-3 * moved.values), "6205", rpm(0.0))
+    assert quiet.fault is None
+    assert "quiet" in quiet.verdict
+    noise = 1e-3 * moved.values.std() * np.random.default_rng(0).standard_normal(moved.shape)
+    assert diagnose_bearing(moved.copy(data=moved.values + noise), "6205", rpm(0.0)).fault == "outer race"
+    hidden = diagnose_bearing(moved.copy(data=1e-3 * (moved.values + noise)), "6205", rpm(0.0))
+    assert hidden.fault is None
 
 
 @pytest.mark.slow

@@ -313,7 +313,8 @@ def test_names_and_units_of_labels(label, name, unit):
     ("name", "unit", "role"),
     [
         ("Drehzahl", "1/min", "speed"), ("Otáčky", "unknown", "speed"), ("x", "tr/min", "speed"),
-        ("speed", "Hz", "speed"), ("velocity", "mm/s", None), ("speed", "mm/s", None),
+        ("speed", "Hz", "speed"), ("Fahrzeuggeschwindigkeit", "km/h", "speed"),
+        ("velocity", "mm/s", None), ("speed", "mm/s", None),
         ("Vitesse vibratoire", "mm/s", None), ("n", "m/s^2", None),
         ("Lagertemperatur", "K", "temperature"), ("T1", "°C", "temperature"), ("temps", "ms", "time"),
         ("Čas", "s", "time"),
@@ -344,8 +345,9 @@ def test_what_the_caller_asks_for_stays():
     assert list(left["channel"].values) == ["a", "n"]
     left, speed = measured(signal, speed_known=True)
     assert (list(left["channel"].values), speed) == (["a"], None)
-    alone = signal.sel(channel=["n"])
-    assert measured(alone)[0] is alone
+    alone, speed = measured(signal.sel(channel=["n"]))
+    assert (list(alone["channel"].values), speed) == (["n"], None)
+    assert any(pd.Series(alone.attrs["notes"]).str.contains(says("'n'", "speed", "nothing else")))
     told = gm.analyse(signal, speed="1600 rpm")
     assert told.speed == pytest.approx(1600 * np.pi / 30)
     assert list(told.levels["channel"].values) == ["a"]

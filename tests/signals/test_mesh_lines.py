@@ -151,3 +151,28 @@ def test_a_sideband_higher_than_the_mesh_line_moves_no_right_speed(orders, off, 
     notes = " ".join(found.notes)
     assert (abs(found.speed / (math.tau * turn) - 1.0) < 2e-4) == right
     assert "turns of the shaft" not in notes if words is None else re.search(words, notes)
+
+
+@pytest.mark.parametrize("beside", ["constant", "drift", "noise", "hum"])
+def test_channels_without_the_mesh_line_do_not_hide_it(beside):
+    """A line 20 dB above all else in one channel; the other holds a setting, a dead sensor, or something else."""
+    t = np.arange(25600) / RATE
+    rng = np.random.default_rng(0)
+    acc = np.cos(math.tau * 725.0 * t) + 0.1 * rng.standard_normal(t.size)
+    other = {
+        "constant": np.full(t.size, 3.0), "drift": 10.0 + t, "noise": rng.standard_normal(t.size),
+        "hum": 12.0 + 0.1 * np.sin(math.tau * 50.0 * t),
+    }[beside]  # fmt: skip
+    alone = estimate_speed(make_signal({"acc": acc}, RATE, teeth=29))
+    found = estimate_speed(make_signal({"acc": acc, "x": other}, RATE, teeth=29))
+    assert found.gmf == pytest.approx(alone.gmf, rel=1e-4)
+
+
+def test_lines_that_stand_in_one_channel_each_are_doubted_and_none_in_any_names_them():
+    t = np.arange(25600) / RATE
+    rng = np.random.default_rng(0)
+    columns = {n: np.cos(math.tau * f * t) + 0.1 * rng.standard_normal(t.size) for n, f in (("a", 725.0), ("b", 941.0))}
+    assert re.search(says("CHECK THE SPEED", "'a'", "'b'"), estimate_speed(make_signal(columns, RATE, teeth=29)).doubt)
+    noise = {n: rng.standard_normal(t.size) for n in "ab"}
+    with pytest.raises(SignalError, match=says("'a'", "'b'", "give the speed")):
+        estimate_speed(make_signal(noise, RATE, teeth=29))

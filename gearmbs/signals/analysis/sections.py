@@ -207,6 +207,7 @@ def trend(
         try:
             report = analyse(
                 section,
+                channels=kept,
                 speed=speed,
                 speed_range=speed_range,
                 speed_channel=speed_channel,

@@ -245,15 +245,17 @@ def _rows(
     reading = {key: settings[key] for key in READING if settings.get(key) is not None}
     analysing = {key: value for key, value in settings.items() if key not in READING}
     helpers = [analysing[key] for key in ("tacho", "speed_channel") if analysing.get(key) is not None]
+    asked = {}
     if reading.get("channels") is not None:
+        asked = {"channels": reading["channels"]}
         reading["channels"] = list(dict.fromkeys([*reading["channels"], *helpers]))
     try:
         if section is None:
-            return feature_rows(analyse(read_any(path, **reading), teeth, **analysing), by)
+            return feature_rows(analyse(read_any(path, **reading), teeth, **asked, **analysing), by)
         rows = []
         for part in sections(path, section, **reading):
             start = float(part["time"].values[0])
-            rows += [{"start_s": start, **row} for row in _part_rows(part, teeth, by, errors, analysing)]
+            rows += [{"start_s": start, **row} for row in _part_rows(part, teeth, by, errors, asked | analysing)]
         return rows
     except SignalError as error:
         if errors == "raise":

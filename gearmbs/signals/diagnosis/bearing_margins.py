@@ -44,6 +44,9 @@ CARRIERS = 20.0
 """Carriers above so many times a line show blows; below, smooth motions have lines, too."""
 LEAST_LEVEL = 0.03
 """m/s^2 RMS of the part of the carriers that a line modulates, from which it accuses."""
+STANDS, BESIDE = 4.0, 30
+"""Medians of the lines beside it from which a line of an envelope stands: of noise alone the largest of three is as
+high, sqrt(log2(3/p)), with the probability p of 5e-5; and how many lines to either side these are."""
 LEAST_AGREEMENT = 0.5
 """Share of the speeds at which a part must be named."""
 SHIFTS = (-0.03, 0.03, -0.05, 0.05)
@@ -267,8 +270,19 @@ def agreed(verdicts: Sequence[Verdicts]) -> Verdicts:
     return tuple(tuple(graded(c, p, own) for p, own in enumerate(channel)) for c, channel in enumerate(middle))
 
 
+def carriers_from(line: float, top: float) -> float:
+    """Return from which frequency carriers of a line are looked at, below a top, Hz."""
+    return min(CARRIERS * line, 0.5 * top)
+
+
 def modulated_level(
-    values: np.ndarray, rate: float, line: float, bands: Callable[..., Iterator[tuple[np.ndarray, float]]], top: float
+    values: np.ndarray,
+    rate: float,
+    line: float,
+    bands: Callable[..., Iterator[tuple[np.ndarray, float]]],
+    top: float,
+    *,
+    standing: bool = False,
 ) -> float:
     """Return the RMS of the part of a record, far above a line, that the line modulates.
 
@@ -283,6 +297,8 @@ def modulated_level(
         Called as bands(values, (low, high)), it yields squared envelopes in bands beside each other.
     top : float
         Hz, up to which the record is looked at. Carriers count from its middle at the latest.
+    standing : bool
+        Whether only bands count in whose envelope the line stands in the lines beside it.
 
     Returns
     -------
@@ -292,10 +308,13 @@ def modulated_level(
     n = values.size
     window = np.hanning(n) * math.sqrt(8.0 / 3.0)
     total = 0.0
-    for square, _ in bands((values - values.mean()) * window, (min(CARRIERS * line, 0.5 * top), top)):
+    for square, _ in bands((values - values.mean()) * window, (carriers_from(line, top), top)):
         spectrum = np.abs(scipy.fft.rfft(square))
         place = round(line * n / rate)
-        depth = 2.0 * float(spectrum[place - 1 : place + 2].max(initial=0.0)) / float(spectrum[0])
+        height = float(spectrum[place - 1 : place + 2].max(initial=0.0))
+        if standing and height < STANDS * float(np.median(spectrum[max(2, place - BESIDE) : place + BESIDE + 1])):
+            continue
+        depth = 2.0 * height / float(spectrum[0])
         # bands come with the spectrum's scale: two samples a line, one side of the spectrum
         power = 2.0 * float(spectrum[0]) * square.size / n**2
         total += power * min(depth, 1.0)

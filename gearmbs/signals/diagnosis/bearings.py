@@ -12,6 +12,7 @@ import scipy.fft
 import xarray as xr
 
 from gearmbs.progress import staged
+from gearmbs.signals.conversion import DERIVATIVE, convert
 from gearmbs.signals.diagnosis.bearing_judgement import (
     CLEAR,
     HARMONICS,
@@ -32,7 +33,14 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
     power_of,
     squared_envelope,
 )
-from gearmbs.signals.diagnosis.bearing_margins import LEAST_LEVEL, Answer, Weighed, modulated_level, weigh
+from gearmbs.signals.diagnosis.bearing_margins import (
+    LEAST_LEVEL,
+    Answer,
+    Weighed,
+    carriers_from,
+    modulated_level,
+    weigh,
+)
 from gearmbs.signals.diagnosis.bearing_report import CAGE, BearingLines, BearingReport, PartFinding, bearing_lines
 from gearmbs.signals.diagnosis.bearing_speed import TOLERANCE
 from gearmbs.signals.errors import MissingMetadataError, SignalError
@@ -224,8 +232,8 @@ def diagnose_bearing(
     tolerance : float
         Share by which the told speed may be off; 0 if it is exact. The shaft's line is looked for within twice as much.
     level : float
-        m/s^2 RMS that a part's lines must modulate far above their own rate; 0 to accuse quieter ones, too. It is not
-        asked of channels that are no acceleration.
+        m/s^2 RMS that a part's lines must modulate far above their own rate; 0 to accuse quieter ones, too. Velocities
+        and displacements are differentiated for it; of other quantities it is not asked, which is noted.
     progress : callable, optional
         Called as progress(fraction, channel); without it a bar is shown where somebody watches.
 
@@ -277,7 +285,7 @@ def diagnose_bearing(
         spectra={name: _table(each, highest * (harmonics + 1)) for name, each in clearest.items()},
         levels=_levels(signal),
         shafts=others,
-        notes=[*notes, *(words for words, doubted in moved if not doubted)],
+        notes=[*notes, *(words for words, doubted in moved if not doubted), *_without_level(signal, findings)],
         stability=_stability(weighed.answers),
         speed_remark=weighed.remark,
         swept=[words for words, doubted in moved if doubted],
@@ -321,6 +329,19 @@ def _found(
         findings += [_finding(one, each, spectra, shaft, turning, slip, level, highest) for each in judged]
         clearest[name] = _clearest_spectrum(spectra, judged)
     return findings, clearest
+
+
+def _without_level(signal: xr.DataArray, findings: Sequence[PartFinding]) -> list[str]:
+    """Return what is said of parts that are named in channels of which no level is known."""
+    units = dict(zip(map(str, signal["channel"].values), units_of(signal), strict=True))
+    named = {f.channel for f in findings if f.grade in (CLEAR, SIGNS) and math.isnan(f.modulated)}
+    return [
+        f"CHECK THE LEVEL: {name!r} is in {units[name]}, of which nothing tells blows from the stiffness that varies "
+        "in a sound bearing, whose lines are as clear where no noise hides them; an acceleration, velocity or "
+        "displacement of the housing does."
+        for name in units
+        if name in named
+    ]
 
 
 def channel_spectrum(values: np.ndarray, rate: float, turns: float) -> EnvelopeSpectrum:
@@ -453,16 +474,23 @@ def _finding(
 
 
 def _modulated(signal: xr.DataArray, line: float, highest: float) -> float:
-    """Return the level that a line modulates, m/s^2; NaN for what is no acceleration."""
+    """Return the level that a line modulates, m/s^2; NaN for what is no motion.
+
+    Velocities and displacements are differentiated, and so is their noise: of these only lines count that stand in it.
+    """
     try:
         dimension, factor = unit_dimension(units_of(signal)[0])
     except SignalError:
         return math.nan
-    if dimension != "acceleration":
+    if dimension not in DERIVATIVE:
         return math.nan
     rate = rate_of(signal)
+    top = EDGE * rate / 2
+    if motion := dimension != "acceleration":
+        low = 0.5 * carriers_from(line, top)
+        signal, factor = convert(signal, "acceleration", band=(low, top), edges="keep"), 1.0
     bands = lambda values, limits: _narrow_bands(values, rate, limits, highest)  # noqa: E731
-    return factor * modulated_level(signal.values[:, 0], rate, line, bands, EDGE * rate / 2)
+    return factor * modulated_level(signal.values[:, 0], rate, line, bands, top, standing=motion)
 
 
 def _multiple_of_turns(judged: Judged, spectra: Sequence[EnvelopeSpectrum], shaft: float, slip: float) -> int | None:

@@ -56,6 +56,8 @@ HOLLOW_POWER, HOLLOW_HEIGHT = 1.0 / 64.0, 0.5
 
 AGREED_BINS = 1.5
 """By which the peak at a harmonic may be off the frequency on which all agree; what is further off is another line."""
+UNCHANGED = 1e-9
+"""Part of its largest value by which a channel must change to be looked at: rounding of constants is far below."""
 MAINS, MAINS_SHARE = (50.0, 60.0), 1e-3
 """Hz, and the share by which a large grid's frequency varies in daily work."""
 MAINS_LINES = 8
@@ -216,18 +218,22 @@ def find_comb(
         low_gmf = 8 * bin_width
         if low_gmf >= high_gmf:
             raise SignalError(f"signal: {n / rate:g} s are too short to tell a GMF below {high_gmf:g} Hz")
-    power, _ = periodograms(signal.values, rate, length, "hann", 0.5, True, "power")
-    height = prominence(power).mean(axis=1)
+    power, names = _spectra(signal, length)
     candidates = np.arange(low_gmf, high_gmf, bin_width / (2 * HARMONICS))
-    score, direct = _comb(height, candidates, bin_width, count)
-    near = np.flatnonzero(score >= NEARLY_BEST * score.max())
-    share = (power / np.maximum(power.sum(axis=0), 1e-300)).sum(axis=1)
-    carried = sum((_at(share, h * candidates[near], bin_width) for h in range(1, HARMONICS + 1)), np.zeros(near.size))
-    best = int(near[np.argmax(carried)])
-    ahead = _lead(score, candidates, best) >= MIN_LEAD
-    if direct[best] < MIN_SCORE_DB and not ahead:
+    tried = _best_comb(power, candidates, bin_width, count)
+    apart = ""
+    if not tried.stands and len(names) > 1:
+        # channels without the line hide it in the mean
+        alone = [_best_comb(power[:, [c]], candidates, bin_width, count) for c in range(len(names))]
+        standing = sorted((c for c, one in enumerate(alone) if one.stands), key=lambda c: -alone[c].height_db)
+        if standing:
+            first_one, tried = standing[0], alone[standing[0]]
+            power, apart = power[:, [first_one]], _apart(names, alone, standing)
+    score, direct, best, height, ahead = tried.score, tried.direct, tried.best, tried.height, tried.ahead
+    if not tried.stands:
+        where = f" in the mean of {', '.join(map(repr, names))}, nor in any of them" if len(names) > 1 else ""
         raise SignalError(
-            f"signal: no gear mesh line stands out (best {direct[best]:.1f} dB at {candidates[best]:.1f} Hz); "
+            f"signal: no gear mesh line stands out{where} (best {direct[best]:.1f} dB at {candidates[best]:.1f} Hz); "
             "give the speed, a tacho, or a narrower speed_range"
         )
     lines = Lines(power, height, bin_width)
@@ -241,8 +247,60 @@ def find_comb(
     if abs(gmf / guess - 1.0) > SAME_COMB:
         score, direct = _comb(height, np.array([gmf]), bin_width, count)
         best = 0
-    doubt = _mains(height, float(gmf), bin_width) or ("" if ahead else _doubt(one._replace(gmf=gmf), others, count))
+    doubt = _mains(height, float(gmf), bin_width) or apart
+    doubt = doubt or ("" if ahead else _doubt(one._replace(gmf=gmf), others, count))
     return Comb(count, float(gmf), float(direct[best]), float(score[best]), first, doubt)
+
+
+class _Tried(NamedTuple):
+    """Combs of a spectrum: score and RMS height of harmonics of each candidate, the best, heights of all lines."""
+
+    score: np.ndarray
+    direct: np.ndarray
+    best: int
+    height: np.ndarray
+    ahead: bool
+    at: float
+
+    @property
+    def height_db(self) -> float:
+        return float(self.direct[self.best])
+
+    @property
+    def stands(self) -> bool:
+        return self.ahead or self.height_db >= MIN_SCORE_DB
+
+
+def _spectra(signal: xr.DataArray, length: int) -> tuple[np.ndarray, list[str]]:
+    """Return averaged power spectra of the channels that change at all, and their names; of all if none does."""
+    values = signal.values
+    changes = np.ptp(values, axis=0) > UNCHANGED * np.abs(values).max(axis=0)
+    changes |= not changes.any()
+    power, _ = periodograms(values[:, changes], rate_of(signal), length, "hann", 0.5, True, "power")
+    return power, [str(name) for name in signal["channel"].values[changes]]
+
+
+def _best_comb(power: np.ndarray, candidates: np.ndarray, bin_width: float, count: int) -> _Tried:
+    height = prominence(power).mean(axis=1)
+    score, direct = _comb(height, candidates, bin_width, count)
+    near = np.flatnonzero(score >= NEARLY_BEST * score.max())
+    share = (power / np.maximum(power.sum(axis=0), 1e-300)).sum(axis=1)
+    carried = sum((_at(share, h * candidates[near], bin_width) for h in range(1, HARMONICS + 1)), np.zeros(near.size))
+    best = int(near[np.argmax(carried)])
+    ahead = _lead(score, candidates, best) >= MIN_LEAD
+    return _Tried(score, direct, best, height, ahead, float(candidates[best]))
+
+
+def _apart(names: Sequence[str], alone: Sequence[_Tried], standing: Sequence[int]) -> str:
+    """Why a line that stands in channels alone may be that of something else: others stand elsewhere; else empty."""
+    first = standing[0]
+    other = next((c for c in standing[1:] if abs(alone[c].at / alone[first].at - 1.0) > SAME_COMB), None)
+    if other is None:
+        return ""
+    return (
+        f"CHECK THE SPEED: the mesh line was taken to be {alone[first].at:.2f} Hz, which stands in {names[first]!r}, "
+        f"but {alone[other].at:.2f} Hz stands in {names[other]!r}, and none in both. Give the speed or a tacho."
+    )
 
 
 def _mains(height: np.ndarray, gmf: float, bin_width: float) -> str:
@@ -303,7 +361,7 @@ def line_near(signal: xr.DataArray, gmf: float, tolerance: float) -> float | Non
     """
     rate = rate_of(signal)
     length = min(signal.sizes["time"], round(SEGMENT_SECONDS * rate))
-    power, _ = periodograms(signal.values, rate, length, "hann", 0.5, True, "power")
+    power, _ = _spectra(signal, length)
     height = prominence(power).mean(axis=1)
     width, top = rate / length, 0.5 * rate / (1.0 + tolerance)
     harmonics = min(HARMONICS, math.floor(top / gmf))
@@ -346,7 +404,7 @@ def own_lines_missing(signal: xr.DataArray, gmf: float, stronger: float) -> bool
     """
     rate = rate_of(signal)
     length = min(signal.sizes["time"], round(SEGMENT_SECONDS * rate))
-    power, _ = periodograms(signal.values, rate, length, "hann", 0.5, True, "power")
+    power, _ = _spectra(signal, length)
     times = round(stronger / gmf)
     own = np.array([h * gmf for h in range(1, 2 * times) if h % times])
     first = np.array([stronger])

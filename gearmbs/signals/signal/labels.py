@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import MissingMetadataError, SignalError
+from gearmbs.signals.signal.loads import LOAD_WORDS, is_unit_of_load, load_of, perhaps
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, shaft_coords, units_of, with_metadata
 from gearmbs.signals.signal.times import SECONDS, SUFFIX
 from gearmbs.signals.signal.units import detected_unit, is_usual, scaled, unit_dimension
@@ -127,7 +128,8 @@ def name_and_unit(label: str) -> tuple[str, str]:
 def is_unit_of_column(text: str) -> bool:
     """Return whether a text is a unit that columns of recordings have."""
     low = text.lower()
-    return is_usual(text) or low in RPM_UNITS or low in OF_ROTATION or low in TEMPERATURE_UNITS or low in ("us", "µs")
+    rotates = low in RPM_UNITS or low in OF_ROTATION
+    return is_usual(text) or rotates or low in TEMPERATURE_UNITS or low in ("us", "µs") or is_unit_of_load(text)
 
 
 def is_clock(name: str) -> bool:
@@ -189,6 +191,8 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
         or (SHAFT_COLUMN.search(key) and low in HERTZ)
     ):
         return "speed"
+    if low in TRAVEL:
+        return "speed"
     if low in SHARES:
         return "share"
     if low in ("hz", "khz"):
@@ -206,7 +210,7 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
     if values is not None and rises_evenly(values) and (unknown or timed or COUNT_COLUMN.match(key)):
         return "count"
     # of no vibration either, as a voltage for the speed, or a unit that nobody knows
-    return "speed" if named and ((electric and len(key) > 1) or low in TRAVEL or not _of_vibration(unit)) else None
+    return "speed" if named and ((electric and len(key) > 1) or not _of_vibration(unit)) else None
 
 
 def _turns(low: str) -> bool:
@@ -265,6 +269,8 @@ def measured(
 ) -> tuple[xr.DataArray, str | None]:
     """Return a signal without the channels that are no vibration, noting them, and the one that holds the speed.
 
+    Torques, currents, powers and forces beside others are left out as well: they say how the machine was loaded.
+
     Parameters
     ----------
     signal : xarray.DataArray
@@ -279,7 +285,7 @@ def measured(
     Returns
     -------
     signal : xarray.DataArray
-        All of it, if nothing else would be left.
+        With what says how the machine was loaded, or all of it, if nothing else would be left, which is noted.
     speed : str or None
         Channel of the speed, if it is to be used.
 
@@ -290,15 +296,36 @@ def measured(
     """
     names = [str(name) for name in signal["channel"].values]
     stay = {*named, *used}
-    columns = zip(names, units_of(signal), signal.values.T, strict=True)
-    told = {n: role for n, unit, values in columns if n not in stay and (role := role_of(n, unit, values)) is not None}
-    if not told or {*names} == {*told} | {*used}:
+    units = dict(zip(names, units_of(signal), strict=True))
+    columns = [(n, units[n], v) for n, v in zip(names, signal.values.T, strict=True) if n not in stay]
+    told = {n: role for n, unit, v in columns if (role := role_of(n, unit, v)) is not None}
+    loads = {n: load for n, unit, _ in columns if n not in told and (load := load_of(n, unit)) is not None}
+    words = {n: WORDS[role] for n, role in told.items()} | {n: LOAD_WORDS[load] for n, load in loads.items()}
+    if {*names} - {*used} <= {*words}:
+        # nothing else is there: of loads these are what was measured, else all
+        kept = list(loads) or list(told)
+        notes = [
+            f"{n!r} {words[n].rstrip(',')}, as nothing else in the record is vibration: levels and lines are of that."
+            for n in kept
+            if loads.get(n) != "force"
+        ]
+    else:
+        kept = []
+        notes = [
+            f"{n!r} is analysed as vibration; if it holds a {load}, say its unit, such as units={{{n!r}: {unit!r}}} "
+            f"(--units '{n}={unit}')."
+            for n, (load, unit) in ((n, perhaps(n, unit)) for n, unit, _ in columns if n not in words)
+            if load is not None
+        ]
+    left_out = [n for n in words if n not in kept]
+    if not notes and not left_out:
         return signal, None
+    if kept and not loads:
+        return with_metadata(signal, notes=[*signal.attrs.get("notes", ()), *notes]), None
     known = speed_known or signal.attrs.get("speed") is not None or bool(shaft_coords(signal))
     speeds = [name for name, role in told.items() if role == "speed"]
-    units = dict(zip(names, units_of(signal), strict=True))
     usable = [name for name in speeds if unit_of_rotation(name, units[name]) is not None or _in_rpm(name, units[name])]
-    used_speed, notes = None, []
+    used_speed = None
     if not known and len(usable) > 1:
         say = f"say which: speed_channel={usable[0]!r} (--speed-channel {usable[0]!r})"
         raise MissingMetadataError("speed", "the analysis", f"the columns {usable} hold speeds; {say}")
@@ -326,8 +353,6 @@ def measured(
             if role == "frequency"
         ]
         notes += [f"{p!r} gives the speed: tacho={p!r} and pulses_per_rev (--tacho, --pulses)." for p in pulses]
-    notes += [
-        f"{name!r} {WORDS[role]} and is not analysed as vibration." for name, role in told.items() if name != used_speed
-    ]
-    left = signal.sel(channel=[name for name in names if name not in told or name == used_speed])
+    notes += [f"{n!r} {words[n]} and is not analysed as vibration." for n in left_out if n != used_speed]
+    left = signal.sel(channel=[name for name in names if name not in left_out or name == used_speed])
     return with_metadata(left, notes=[*left.attrs.get("notes", ()), *notes]), used_speed
