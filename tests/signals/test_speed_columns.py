@@ -79,7 +79,7 @@ def test_an_angular_velocity_in_reciprocal_seconds_is_remarked_on(tmp_path):
 
 @pytest.mark.parametrize(("name", "unit", "values", "role"), [
     ("n", "unknown", np.arange(100.0), "count"), ("n", "unknown", ACC, None), ("f", "Hz", RPM / 60.0, "frequency"),
-    ("speed", "mm/s", ACC, None), ("wind speed", "m/s", ACC, None), ("gyro x", "rad/s", ACC, None),
+    ("speed", "mm/s", ACC, None), ("wind speed", "m/s", ACC, "travel"), ("gyro x", "rad/s", ACC, None),
     ("torsion", "deg/s", ACC, None), ("speed pulse", "V", ACC, "tacho"), ("v", "mm/s RMS", ACC, None),
     ("a", "0.001 g", ACC, None), ("speed", "unknown", RPM, "speed"), ("n", "-", RPM, "speed"),
 ])  # fmt: skip

@@ -23,6 +23,7 @@ from gearmbs.signals.analysis.report import (
     line_spectrum,
     name_lines,
     strongest_lines,
+    unchanging,
 )
 from gearmbs.signals.analysis.vibration import VibrationReport, vibration_report
 from gearmbs.signals.diagnosis.planetary import PlanetaryReport, diagnose_planetary
@@ -332,6 +333,8 @@ def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOpti
     impulsive = impulsive_band(signal, lambda f, _: tell("kurtogram", f))
     if isinstance(impulsive, str):
         missing["impulsive"] = impulsive
+    elif (still := unchanging(signal)) is not None:
+        missing["impulsive"] = still
     if shaft.estimate is None:
         missing["estimate"] = f"the speed is {shaft.origin}, it was not estimated"
     tell("done", 1.0)

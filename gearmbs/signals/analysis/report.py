@@ -141,13 +141,24 @@ def line_spectrum(signal: xr.DataArray) -> xr.DataArray:
 
 
 def impulsive_band(signal: xr.DataArray, progress: Callable[[float, str], None] | None = None) -> xr.Dataset | str:
-    """Kurtogram of the record, or why there is none."""
+    """Kurtogram of the record, NaN of channels that do not change (`unchanging` says so), or why there is none."""
     least = 2 * (16 << KURTOGRAM_LEVELS)
     if signal.sizes["time"] < least:
         return f"the record holds {signal.sizes['time']} samples, a kurtogram needs {least}"
-    if not np.all(np.std(signal.values, axis=0) > 0.0):
-        return "a channel does not change, which leaves nothing to find a band in"
-    return kurtogram(signal, levels=KURTOGRAM_LEVELS, progress=progress)
+    changes = np.std(signal.values, axis=0) > 0.0
+    if not changes.any():
+        return "no channel changes, which leaves nothing to find a band in"
+    found = kurtogram(signal.isel(channel=changes), levels=KURTOGRAM_LEVELS, progress=progress)
+    return found if changes.all() else found.reindex(channel=signal["channel"].values)
+
+
+def unchanging(signal: xr.DataArray) -> str | None:
+    """Return in words which channels do not change and so have no band, or None where all do."""
+    still = [
+        str(name) for name, spread in zip(signal["channel"].values, np.std(signal.values, axis=0)) if not spread > 0
+    ]
+    listed = ", ".join(map(repr, still))
+    return f"{listed} does not change, which leaves nothing to find a band in" if still else None
 
 
 def channel_table(data: xr.Dataset) -> pd.DataFrame:

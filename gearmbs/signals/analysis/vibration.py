@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -29,6 +30,7 @@ from gearmbs.signals.analysis.report import (
     significant,
     strongest_lines,
     transposed,
+    unchanging,
 )
 from gearmbs.signals.conversion import convert
 from gearmbs.signals.errors import SignalError
@@ -174,7 +176,8 @@ class VibrationReport(Shown):
     def _band_words(self) -> list[str]:
         assert self.envelope is not None
         ends = zip(self.channels, self.envelope["low"].values, self.envelope["high"].values)
-        return ["; ".join(f"{name} in {low:.0f} to {high:.0f} Hz" for name, low, high in ends) + "."]
+        known = (f"{name} in {low:.0f} to {high:.0f} Hz" for name, low, high in ends if not math.isnan(low))
+        return ["; ".join(known) + "."]
 
     def _speed_words(self) -> str:
         if self.speed is None:
@@ -262,11 +265,9 @@ def vibration_report(
     tell(0.1, "levels")
     table = levels(kept, FULL_LEVELS)
     velocity = _velocity(kept)
-    if isinstance(velocity, str):
-        missing["velocity_rms"] = velocity
-        table["velocity_rms"] = ("channel", np.full(kept.sizes["channel"], np.nan), {"units": "m/s"})
-    else:
-        table["velocity_rms"] = ("channel", velocity, {"units": "m/s"})
+    table["velocity_rms"] = ("channel", velocity.values, {"units": "m/s"})
+    if velocity.missing:
+        missing["velocity_rms"] = velocity.missing
     tell(0.25, "lines")
     average = line_spectrum(kept)
     shaft_hz = None if speed is None else speed / math.tau
@@ -281,6 +282,8 @@ def vibration_report(
         missing["impulsive"] = impulsive
         missing["envelope"] = missing["envelope_lines"] = "there is no impulsive band to take it in: " + impulsive
     else:
+        if (still := unchanging(kept)) is not None:
+            missing["impulsive"] = still
         tell(0.8, "envelope")
         try:
             demodulated = _envelope(kept, impulsive)
@@ -341,24 +344,38 @@ def _speed(signal: xr.DataArray, found: Shaft | float | None, notes: list[str]) 
     return refined, f"from {lines}, {100 * (refined / found - 1):+.3f} % off the given speed"
 
 
-def _velocity(signal: xr.DataArray) -> np.ndarray | str:
-    """RMS velocity (m/s) of each channel, or why there is none."""
-    rate = rate_of(signal)
-    try:
-        kinds = [unit_dimension(unit)[0] for unit in units_of(signal)]
-    except SignalError:
-        levels = [unit for unit in units_of(signal) if detected_unit(unit) is not None]
-        known = f"{levels[0]!r} is the unit of a level" if levels else "the units are not known"
-        return f"{known}; give units='m/s^2' or 'g'"
-    if any(kind not in ("acceleration", "velocity") for kind in kinds):
-        return "a channel is neither an acceleration nor a velocity"
+class _Velocity(NamedTuple):
+    """RMS velocity of each channel, m/s, NaN where there is none, and why not in words."""
+
+    values: np.ndarray
+    missing: str
+
+
+def _velocity(signal: xr.DataArray) -> _Velocity:
+    """RMS velocity of those channels whose unit and rate allow."""
+    rate, units = rate_of(signal), units_of(signal)
+    names = [str(name) for name in signal["channel"].values]
+    values = np.full(len(units), np.nan)
     low, high = VELOCITY_BAND
     if rate < 2.5 * high:
-        return f"its band reaches to {high:g} Hz, the sampling rate is {rate:g} Hz"
-    try:
-        return np.std(convert(signal, "velocity", band=(low, high)).values, axis=0)
-    except SignalError as error:
-        return str(error)
+        return _Velocity(values, f"its band reaches to {high:g} Hz, the sampling rate is {rate:g} Hz")
+    why: list[str] = []
+    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
+        try:
+            kind = unit_dimension(unit)[0]
+        except SignalError:
+            known = f"is {unit!r}, that of a level" if detected_unit(unit) is not None else "is not known"
+            example = f"{{{name!r}: 'g'}} (--units '{name}=g')" if len(names) > 1 else "'m/s^2' or 'g'"
+            why.append(f"the unit of {name!r} {known}; give units={example}")
+            continue
+        if kind not in ("acceleration", "velocity"):
+            why.append(f"{name!r} is neither an acceleration nor a velocity")
+            continue
+        try:
+            values[i] = np.std(convert(signal.isel(channel=[i]), "velocity", band=(low, high)).values)
+        except SignalError as error:
+            why.append(str(error))
+    return _Velocity(values, "; ".join(dict.fromkeys(why)))
 
 
 def _orders(signal: xr.DataArray, found: Shaft | float | None, speed: float | None) -> pd.DataFrame | str:
@@ -391,7 +408,8 @@ def _envelope(signal: xr.DataArray, impulsive: xr.Dataset) -> xr.DataArray:
     rate = rate_of(signal)
     cuts: list[xr.DataArray] = []
     bands: list[tuple[float, float]] = []
-    for i in range(signal.sizes["channel"]):
+    changing = np.flatnonzero(np.isfinite(impulsive["best_kurtosis"].values))
+    for i in map(int, changing):
         centre, width = _wide_band(impulsive, i, rate)
         low = max(centre - 0.5 * width, EDGE * width)
         high = min(centre + 0.5 * width, rate / 2 - EDGE * width)
@@ -405,10 +423,11 @@ def _envelope(signal: xr.DataArray, impulsive: xr.Dataset) -> xr.DataArray:
     length = min(round(LINE_SECONDS * rate), *(cut.sizes["time"] for cut in cuts))
     parts = [spectrum(cut, scaling="rms", segment=length) for cut in cuts]
     joined = xr.concat(parts, "channel", join="override", combine_attrs="override").transpose("frequency", "channel")
-    return joined.assign_coords(
+    joined = joined.assign_coords(
         low=("channel", [low for low, _ in bands], {"units": "Hz"}),
         high=("channel", [high for _, high in bands], {"units": "Hz"}),
     )
+    return joined if changing.size == signal.sizes["channel"] else joined.reindex(channel=signal["channel"].values)
 
 
 def _wide_band(impulsive: xr.Dataset, channel: int, rate: float) -> tuple[float, float]:

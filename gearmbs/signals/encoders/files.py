@@ -1,12 +1,13 @@
 """Pulses in and out of files of any format: a column of times, or of counts of a clock, for each encoder.
 
-Columns may differ in length; the shorter ones end with empty cells. A column `name index` holds the pulses once a turn.
+Columns may differ in length; the shorter ones end with empty cells. A column `name index` holds the pulses once a turn,
+also where only one of both names says that it holds times, as `driver index` beside `t_driver`.
 Where a column holds neither times nor counts, it is the sampled voltage of an encoder, and its edges are taken.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -17,7 +18,9 @@ from gearmbs.signals.encoders.pulses import PulseTrain, TrainKeywords, pulse_tra
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
 from gearmbs.signals.files.formats import checked_format, damage_named, format_to_write, read_signal, write_record
 from gearmbs.signals.files.table import Asked, format_of
+from gearmbs.signals.signal.labels import CLOCK_NAMES
 from gearmbs.signals.signal.record import SECONDS, Record
+from gearmbs.signals.signal.words import words_of
 from gearmbs.units import QuantityLike, to_si
 
 INDEX = " index"
@@ -27,6 +30,8 @@ COUNTER_BITS = (16, 24, 32)
 LONGEST_FIT = 10.0
 """Usual steps up to which the one across an overflow may be: missing pulses are told and mended later."""
 COUNTS = frozenset({"ticks", "tick", "counts", "count"})
+RISING = 0.9
+"""Share of the steps of times and counts that rise, also of a counter that begins anew; of a voltage half do."""
 KNOWN = "encoders"
 """Attribute of a file that says how many lines the encoders have, and which teeth are at mark 0."""
 
@@ -125,7 +130,8 @@ def read_pulses(
     table = dict(zip(record.names, record.values.T))
     units = dict(zip(record.names, record.units))
     told: dict[str, dict[str, Any]] = record.attrs.get(KNOWN, {})
-    wanted = list(lines) if isinstance(lines, Mapping) else list(told) or [n for n in table if not n.endswith(INDEX)]
+    marked = _index_columns(list(table), lines if isinstance(lines, Mapping) else (), path)
+    wanted = list(lines) if isinstance(lines, Mapping) else list(told) or [n for n in table if n not in marked.values()]
     missing = [name for name in wanted if name not in table]
     if missing:
         raise SignalFileError(path, f"has no column {missing[0]!r}; it holds {record.names}")
@@ -140,13 +146,11 @@ def read_pulses(
             )
         more: dict[str, Any] = {"name": name, "tooth_at_zero": about.get("tooth_at_zero"), **known}
         factor = _factor(units[name], clock, unit, path)
-        once = name + INDEX if name + INDEX in table else None
+        once = marked.get(name)
         if factor is not None:
             begin = _unwrapped(table, name, once, count, begin, factor, path)
-        if factor is None and np.all(np.diff(_present(table[name])) > 0.0):
-            raise MissingMetadataError(
-                "unit", f"{name!r} in {path.name} (it rises throughout)", "pass unit='s' of times, or clock='20 MHz'"
-            )
+        if factor is None:
+            _asked_for_unit(name, _present(table[name]), path)
         if factor is None:
             signal = read_signal(path, rate=rate, channels=[name, once] if once else [name])
             found[name] = pulses_of_channel(signal, count, name, index=once, **more)
@@ -154,6 +158,57 @@ def read_pulses(
             index = None if once is None else factor * _present(table[once])
             found[name] = pulse_train(factor * _present(table[name]), count, index=index, **more)
     return found
+
+
+def _index_columns(names: Sequence[str], asked: Collection[str], path: Path) -> dict[str, str]:
+    """Return the columns with the pulses once a turn by those of the encoders that they are of.
+
+    Raises
+    ------
+    SignalFileError
+        If one is of no encoder in the file, or of several.
+    """
+    found, lost = {}, []
+    pulses = [name for name in names if name in asked or not name.lower().endswith(INDEX)]
+    for name in names:
+        if name in pulses:
+            continue
+        stem = name[: -len(INDEX)]
+        alike = [stem] if stem in pulses else [each for each in pulses if _stem(each) == _stem(stem)]
+        if len(alike) == 1:
+            found[alike[0]] = name
+        else:
+            lost.append(name)
+    if lost and pulses:
+        raise SignalFileError(
+            path, f"its columns {lost} are called as those of pulses once a turn, and belong to none of {pulses}; call "
+            f"them as their encoder with {INDEX!r} behind it, for instance {pulses[0] + INDEX!r}"
+        )  # fmt: skip
+    return found
+
+
+def _stem(name: str) -> list[str]:
+    """Return the words of a name but those that say that it holds times."""
+    return [word for word in words_of(name) if word not in CLOCK_NAMES]
+
+
+def _asked_for_unit(name: str, column: np.ndarray, path: Path) -> None:
+    """Ask for the clock of counts or the unit of times in a column without one that rises as these do."""
+    rising = float(np.mean(np.diff(column) > 0.0)) if column.size > 1 else 0.0
+    if rising < RISING:
+        return
+    how = "throughout" if rising == 1.0 else f"in {100.0 * rising:.4g} % of its steps"
+    if np.array_equal(column, np.rint(column)):
+        raise MissingMetadataError(
+            "clock",
+            f"{name!r} in {path.name} (whole numbers that rise {how}, as counts do)",
+            "pass clock='20 MHz' of the counter (--clock), or unit='us' of times (--unit)",
+        )
+    raise MissingMetadataError(
+        "unit",
+        f"{name!r} in {path.name} (it rises {how})",
+        "pass unit='s' of times (--unit), or clock='20 MHz' of counts (--clock)",
+    )
 
 
 def _unwrapped(

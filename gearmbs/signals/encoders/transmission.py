@@ -260,7 +260,8 @@ def _check_trains(runs: Sequence[CoupledRun], freed: Mapping[str, list[PulseTrai
         if loose and len(trains) > 1:
             raise SignalError(
                 f"runs: nothing says which pulse of {loose[0]!r} is that of mark 0, by which records of the {name} are "
-                "combined; record index pulses and give them with index=..., or use one run alone"
+                "combined; record index pulses (index=..., in files a column 'driver index' beside 'driver'), or use "
+                "one run alone"
             )
     for run in runs:
         measured = run.driver.mean_speed / run.driven.mean_speed

@@ -1,11 +1,33 @@
-"""What cells of text tables hold beside plain numbers: printed minus signs, groups of thousands, AM and PM."""
+"""What cells of text tables hold: numbers, gaps, stamps, printed minus signs, groups of thousands, AM and PM, words."""
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Iterable, Sequence
+from typing import Literal
 
 import pandas as pd
+
+COMMENT = re.compile(r"^\s*[#%]")
+GAP_CELLS = frozenset(
+    {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf", "∞", "-∞", "+∞"}
+)
+DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.](?:\d{1,2}|[A-Za-z]{3})[-/.]\d{4})"
+CLOCK = r"(?:\d+ days? )?\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?: ?[AaPp]\.?[Mm]\.?)?(?:Z|[+-]\d{2}:?\d{2})?"
+DURATION = re.compile(r"^([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?) ?(ms|sec|s|min|hr|days|day)$")
+"""As MATLAB writes times of a timetable."""
+STAMPS: tuple[tuple[str, re.Pattern[str]], ...] = (
+    ("stamp", re.compile(rf"^{DATE}[T ]{CLOCK}$")),
+    ("date", re.compile(rf"^{DATE}$")),
+    ("clock", re.compile(rf"^{CLOCK}$")),
+    ("clock", DURATION),
+)
+SEPARATIONS: tuple[tuple[str | None, str], ...] = (
+    (";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (",", ","), (None, "."), (None, ","),
+)  # fmt: skip
+"""Commas between numbers with decimal commas are those of quoted cells."""
+Kind = Literal["number", "gap", "stamp", "date", "clock", "text"]
 
 MINUS = "\u2212\u2013\u2012\ufe63\uff0d"
 """Signs that typesetters and spreadsheets write for a minus."""
@@ -78,3 +100,37 @@ def of_24_hours(texts: pd.Series) -> tuple[pd.Series, bool]:
     hours = pd.to_numeric(parts[1]) % 12 + 12 * parts[3].str.lower().eq("p")
     written = parts[0] + hours.fillna(0).astype(int).astype(str).str.zfill(2) + parts[2]
     return texts.where(~found, written), True
+
+
+def cell_kind(cell: str, decimal: str) -> Kind:
+    """What a cell holds: a number, a gap, a time stamp, a date, a time of day, or text."""
+    text = cell.strip().strip('"').strip()
+    if text.lower() in GAP_CELLS:
+        return "gap"
+    if is_number(text, decimal):
+        return "number"
+    for kind, pattern in STAMPS:
+        if pattern.match(text):
+            return kind  # type: ignore[return-value]
+    return "text"
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """True for a number with this decimal sign."""
+    try:
+        float(cell.replace(",", ".") if decimal == "," else cell)
+    except ValueError:
+        return False
+    return "_" not in cell
+
+
+def split_cells(line: str, separator: str | None) -> list[str]:
+    """The cells of a line."""
+    line = line.strip("\r\n") if separator == "\t" else line.strip()
+    if separator == ",":
+        try:
+            return [cell.strip() for cell in next(csv.reader([line]))]
+        except (StopIteration, csv.Error):
+            return []
+    cells = [cell.strip().strip('"') for cell in line.split(separator)]
+    return cells[:-1] if separator is not None and cells and cells[-1] == "" else cells

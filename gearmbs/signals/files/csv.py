@@ -10,7 +10,6 @@ from __future__ import annotations
 import gzip
 import io
 import json
-import re
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,7 +22,18 @@ import pandas as pd
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.files.cells import MINUS, WITHOUT, between_thousands, thousands_column, with_minus
+from gearmbs.signals.files.beside_words import Words
+from gearmbs.signals.files.cells import (
+    COMMENT,
+    GAP_CELLS,
+    MINUS,
+    WITHOUT,
+    between_thousands,
+    cell_kind,
+    split_cells,
+    thousands_column,
+    with_minus,
+)
 from gearmbs.signals.files.encodings import encoding_of, utf16_without_mark
 from gearmbs.signals.files.labview import read_lvm
 from gearmbs.signals.files.own_clocks import on_one_clock, own_clocks
@@ -31,22 +41,22 @@ from gearmbs.signals.files.scales import named_factors, scale_told
 from gearmbs.signals.files.scopes import scope_layout
 from gearmbs.signals.files.table import Asked, Content, Format, begins_with
 from gearmbs.signals.files.text_tables import (
-    COMMENT,
-    GAP_CELLS,
     HEAD_LINES,
     INDEX_NAMES,
     LONGEST_SECONDS,
+    TAIL_READ,
     CsvLayout,
     Times,
-    cell_kind,
+    digits_of,
     find_layout,
     index_meaning,
+    last_lines,
     pointed,
-    split_cells,
 )
-from gearmbs.signals.signal.labels import FEWEST_EVEN, rises_evenly, role_of, words_of
+from gearmbs.signals.signal.labels import FEWEST_EVEN, rises_evenly, role_of
 from gearmbs.signals.signal.record import (
     REMEDY,
+    SHAFT_COLUMNS,
     Progress,
     RateCandidate,
     Record,
@@ -58,6 +68,7 @@ from gearmbs.signals.signal.record import (
     speed_of,
 )
 from gearmbs.signals.signal.signal import ROUNDED_TIMES, UNKNOWN_UNITS, check_teeth
+from gearmbs.signals.signal.words import words_of
 from gearmbs.wording import warn
 
 CHUNK_ROWS = 1 << 17
@@ -71,12 +82,13 @@ COUNT = "gearmbs_samples"
 """Line of the header that says how many rows follow: a table cut at the end of a row looks whole."""
 CUT = "CHECK THE END: "
 """Begin of what is said of a table that looks cut off, and warned of."""
-TAIL, TAIL_READ = 1 << 14, 1 << 20
-"""Bytes at the end of a text that are looked at, and that are read at once to come there."""
 FEWEST_FIXED = 20
 """Rows of the same number of digits that make a format: those without trailing zeros have fewer in one of ten."""
 MOST_ODD = 0.05
 """Part of the characters of a text that may be none of UTF-8 or of control, as umlauts of older code pages are."""
+CHOOSE = "choose other columns with channels=[...] (--channel)"
+MOST_ALONE = 2
+"""Columns of a table beside which there are no others to choose: times and one channel."""
 LONGEST_EMPTY = 0.1
 """Share of the rows in which a speed may be missing in a row: a drive may change its speed meanwhile."""
 LONGEST_STEP = 5.0
@@ -118,25 +130,41 @@ def read_csv(
         layout = _layout(path, packed, pulses)
         if pulses and layout.index is not None and layout.names[layout.index].strip().lower() not in INDEX_NAMES:
             layout = replace(layout, index=None)
-        times = Times(layout, path)
-        blocks: list[np.ndarray] = []
-        clocks: list[np.ndarray | None] = []
-        for values, stamped, fraction in _blocks(path, packed, layout, gaps):
-            blocks.append(values)
-            clocks.append(None if layout.groups else times.seconds(values, stamped))
-            if progress is not None:
-                progress(fraction, "reading")
+        asked = None if pulses or layout.groups else channels
+        named = {i: layout.names[i] for i in layout.beside}
+        while True:
+            words = Words(named)
+            times = Times(layout, path)
+            blocks: list[np.ndarray] = []
+            clocks: list[np.ndarray | None] = []
+            try:
+                for values, stamped, fraction in _blocks(path, packed, layout, gaps, words):
+                    blocks.append(values)
+                    clocks.append(None if layout.groups else times.seconds(values, stamped))
+                    if progress is not None:
+                        progress(fraction, "reading")
+                break
+            except _WrongCell as wrong:
+                lost = [name for name in asked or () if name not in (*layout.names, *SHAFT_COLUMNS)]
+                if lost:
+                    raise SignalFileError(path, f"has no channel {lost}; it holds {layout.names}") from None
+                if not _may_be_left_out(wrong.column, layout, asked):
+                    raise SignalFileError(path, wrong.fault) from wrong.__cause__
+                # gaps, or words far down, in a column that nobody asked for
+                layout = replace(layout, beside=(*layout.beside, wrong.column))
         if not blocks:
             raise SignalFileError(path, "holds no rows of numbers")
         known = [clock for clock in clocks if clock is not None]
         clock = np.concatenate(known) if known else None
         values = np.concatenate(blocks)
-        count, said = len(values), []
+        count, said = len(values), words.said()
+        if clock is None and not layout.groups and (mixed := words.mixed()) is not None:
+            raise SignalFileError(path, mixed)
         if layout.groups:
             one = on_one_clock(path, values, layout.groups, layout.names, layout.units, channels, gaps)
-            values, clock, said = one.values, one.times, one.said
+            values, clock, said = one.values, one.times, [*said, *one.said]
             layout = replace(layout, groups=(), clock=one.clock, beside=(*layout.beside, *one.left_out))
-        said += [] if pulses else _bridged(path, values, layout, gaps)
+        said += [] if pulses else _bridged(path, values, layout, gaps, channels)
         found = _record(path, values, clock, layout, rate)
         said += _end_checked(path, packed, layout, count)
         return replace(found, notes=[*found.notes, *said]) if said else found
@@ -153,13 +181,13 @@ def _end_checked(path: Path, packed: bool, layout: CsvLayout, count: int) -> lis
     own = number_of(layout.meta.get(COUNT))
     if own is not None and own[0] != count:
         raise SignalFileError(path, f"holds {count} of the {own[0]:g} samples that its header names: it is cut off")
-    ended, lines = _tail(path, packed)
+    ended, lines = last_lines(path, packed)
     if own is not None:
         if not ended:
             raise SignalFileError(path, "its last line has no end: it is cut off within a number")
         return []
     where = f"{path.name}, line {layout.first + count}"
-    told = [_written(split_cells(line, layout.separator)[-1]) for line in lines if split_cells(line, layout.separator)]
+    told = [digits_of(split_cells(line, layout.separator)[-1]) for line in lines if split_cells(line, layout.separator)]
     fixed = len(told) > FEWEST_FIXED and len(set(told[:-1])) == 1 and told[0] not in (None, (0, 0))
     if fixed and told[-1] != told[0]:
         how = "The last line has no end, and its" if not ended else "The last line's"
@@ -171,35 +199,12 @@ def _end_checked(path: Path, packed: bool, layout: CsvLayout, count: int) -> lis
     return [said if fixed else CUT + said]
 
 
-def _tail(path: Path, packed: bool) -> tuple[bool, list[str]]:
-    """Return whether the last line of a text has an end, and its last lines with numbers."""
-    tail = b""
-    with path.open("rb") as raw:
-        if packed:
-            with gzip.GzipFile(fileobj=raw) as stream:
-                while piece := stream.read(TAIL_READ):
-                    tail = (tail + piece)[-TAIL:]
-        else:
-            raw.seek(0, 2)
-            raw.seek(max(0, raw.tell() - TAIL))
-            tail = raw.read()
-    # the second byte of a character of two, or the last three of four
-    ended = tail.rstrip(b"\0").endswith((b"\n", b"\r"))
-    text = tail.replace(b"\0", b"").decode("utf-8", errors="replace")
-    lines = [line for line in text.splitlines()[1:] if line.strip() and not COMMENT.match(line)]
-    return ended, lines
-
-
-def _written(cell: str) -> tuple[int, int] | None:
-    """Return how many decimals and characters of an exponent a number has; None for what is no number."""
-    found = re.fullmatch(r"[-+]?\d*(?:[.,](\d*))?([eE][-+]?\d*)?", cell.strip())
-    return None if found is None else (len(found.group(1) or ""), len(found.group(2) or ""))
-
-
 def csv_pieces(
-    path: Path, packed: bool, rate: float | None, gaps: str | None, layout: CsvLayout
+    path: Path, packed: bool, rate: float | None, gaps: str | None, layout: CsvLayout, channels: Sequence[str] | None
 ) -> Iterator[tuple[Record, float]]:
     """Read a text table block by block: records in their order, each with the fraction read by then.
+
+    Of `channels` that are asked for others may hold words.
 
     Raises
     ------
@@ -207,12 +212,16 @@ def csv_pieces(
         As `read_csv`, and if the times of a block do not go on where the last one ended.
     """
     with _damage_named(path):
+        unread = [name for i, name in enumerate(layout.names) if _may_be_left_out(i, layout, channels)]
+        layout = replace(layout, beside=tuple({*layout.beside, *map(layout.names.index, unread)}))
         times, first, count = Times(layout, path), None, 0
-        for values, stamped, fraction in _blocks(path, packed, layout, gaps):
+        words = Words({i: layout.names[i] for i in layout.beside if layout.names[i] not in unread})
+        for values, stamped, fraction in _blocks(path, packed, layout, gaps, words):
             clock = times.seconds(values, stamped)
-            said = _bridged(path, values, layout, gaps)
+            said = _bridged(path, values, layout, gaps, channels)
             record = _record(path, values, clock, layout, rate if first is None else first.rate)
             record.notes += said
+            record.notes += words.said() if first is None else []
             if first is None:
                 first = record
             elif clock is not None and first.rate is not None:
@@ -225,17 +234,20 @@ def csv_pieces(
             if checked_gaps(gaps) == "interpolate":
                 record = replace(record, values=_filled(record.values))
             yield record, fraction
-        for words in _end_checked(path, packed, layout, count):
-            warn(words, UserWarning)
+        for said_of_end in _end_checked(path, packed, layout, count):
+            warn(said_of_end, UserWarning)
 
 
-def _bridged(path: Path, values: np.ndarray, layout: CsvLayout, gaps: str | None) -> list[str]:
+def _bridged(
+    path: Path, values: np.ndarray, layout: CsvLayout, gaps: str | None, channels: Sequence[str] | None
+) -> list[str]:
     """Fill columns that may be written in some rows only, in place; say of which, and how many rows.
 
     Raises
     ------
     SignalFileError
-        If a speed is missing for long, beside rows in which it is there, and `gaps` does not say what to do.
+        If a speed is missing for long, beside rows in which it is there, or a load in less than half of them, `gaps`
+        does not say what to do, and neither `channels` do without it.
     """
     said = []
     for i in layout.slow:
@@ -247,8 +259,12 @@ def _bridged(path: Path, values: np.ndarray, layout: CsvLayout, gaps: str | None
         longest, usual = int(steps.max()) - 1, float(np.median(steps))
         name = layout.names[i]
         missing = f"{name!r} is empty in {lost} of {len(values)} rows, in up to {longest} in a row"
+        refuse = checked_gaps(gaps) == "refuse" and not _may_be_left_out(i, layout, channels)
+        if refuse and role_of(name, layout.units[i]) is None and i not in layout.own and 2 * lost < len(values):
+            # a load that is written as often as vibration may be analysed
+            raise SignalFileError(path, f"{missing}; {REMEDY}, or {CHOOSE}")
         odd = longest > max(LONGEST_EMPTY * len(values), LONGEST_STEP * usual)
-        if odd and role_of(name, layout.units[i]) == "speed" and checked_gaps(gaps) == "refuse":
+        if odd and role_of(name, layout.units[i]) == "speed" and refuse:
             raise SignalFileError(
                 path, f"{missing}, too many to tell the speed; pass gaps='interpolate' (--gaps interpolate) for "
                 "straight lines across them, or channels=[...] (--channel) without it"
@@ -340,8 +356,23 @@ def _holds_printed_minus(path: Path, packed: bool) -> bool:
     return False
 
 
+class _WrongCell(SignalFileError):
+    """A column that holds something else than a number in a row."""
+
+    def __init__(self, path: Path, fault: str, column: int) -> None:
+        super().__init__(path, fault)
+        self.column = column
+
+
+def _may_be_left_out(column: int, layout: CsvLayout, channels: Sequence[str] | None) -> bool:
+    """Return whether a column is none of those asked for, if some are, nor needed with them."""
+    apart = (layout.clock, layout.index, *layout.stamps)
+    asked = channels is not None and layout.names[column] not in (*channels, *SHAFT_COLUMNS)
+    return asked and column not in apart
+
+
 def _blocks(
-    path: Path, packed: bool, layout: CsvLayout, gaps: str | None
+    path: Path, packed: bool, layout: CsvLayout, gaps: str | None, seen: Words
 ) -> Iterator[tuple[np.ndarray, pd.DataFrame | None, float]]:
     """Tables of numbers (NaN in columns of time stamps, which come as text beside them), and the fraction read."""
     width, first, separator = len(layout.names), layout.first, layout.separator
@@ -370,6 +401,7 @@ def _blocks(
             )
             for block in table:
                 stamped = block[list(layout.stamps)] if layout.stamps else None
+                seen.add(block)
                 numbers = block.drop(columns=list(words)) if words else block
                 values = np.full((len(block), width), np.nan)
                 values[:, numbers.columns] = numbers.to_numpy()
@@ -380,7 +412,8 @@ def _blocks(
     except (ValueError, pd.errors.ParserError) as exc:
         if isinstance(exc, SignalError):
             raise
-        raise SignalFileError(path, _first_bad_line(path, packed, layout, width, refuse, exc)) from exc
+        fault, column = _first_bad_line(path, packed, layout, width, refuse, exc)
+        raise (SignalFileError(path, fault) if column is None else _WrongCell(path, fault, column)) from exc
 
 
 def _record(
@@ -475,7 +508,10 @@ def write_csv(record: Record, path: Path, packed: bool, progress: Progress | Non
                     progress(min(1.0, (start + CHUNK_ROWS) / count), "writing")
 
 
-def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, refuse: bool, exc: Exception) -> str:
+def _first_bad_line(
+    path: Path, packed: bool, layout: CsvLayout, width: int, refuse: bool, exc: Exception
+) -> tuple[str, int | None]:
+    """Return what is wrong in words, and the column of which it is the only fault."""
     with _open_text(path, packed) as (text, _):
         for number, line in enumerate(text, 1):
             if number <= layout.first or not line.strip() or COMMENT.match(line):
@@ -484,22 +520,25 @@ def _first_bad_line(path: Path, packed: bool, layout: CsvLayout, width: int, ref
             if layout.separator == "\t" and len(cells) == width - 1 and layout.empty:
                 cells.append("")
             if len(cells) > width or (refuse and len(cells) < width):
-                return f"line {number} has {len(cells)} values where {width} are expected: {line.strip()[:60]!r}"
+                return f"line {number} has {len(cells)} values where {width} are expected: {line.strip()[:60]!r}", None
             for column, cell in enumerate(cells):
                 if column in (*layout.stamps, *layout.empty, *layout.beside):
                     continue
                 kind = cell_kind(cell, layout.decimal)
                 if kind == "gap" and refuse and column not in layout.slow:
                     shown = f"{cell[:40]!r}" if cell else "nothing"
-                    return f"line {number} holds {shown} in column {layout.names[column]!r}; {REMEDY}"
+                    others = f", or {CHOOSE}" if width > MOST_ALONE else ""
+                    return f"line {number} holds {shown} in column {layout.names[column]!r}; {REMEDY}{others}", column
                 sign = between_thousands(cell)
                 if kind not in ("number", "gap") and sign is not None:
-                    return f"line {number} holds {cell[:40]!r}, with {sign!r} between thousands; {WITHOUT}"
+                    return f"line {number} holds {cell[:40]!r}, with {sign!r} between thousands; {WITHOUT}", column
                 if kind not in ("number", "gap"):
-                    return f"line {number} holds {cell[:40]!r}, which is not a number"
+                    shown = f"{cell[:40]!r} in column {layout.names[column]!r}"
+                    remedy = f"; {CHOOSE}" if width > MOST_ALONE else ""
+                    return f"line {number} holds {shown}, which is not a number{remedy}", column
                 if refuse and not np.isfinite(float(cell.replace(",", ".") if layout.decimal == "," else cell)):
-                    return f"line {number} holds {cell[:40]!r}; {REMEDY}"
-    return f"cannot be read as a table ({exc})"
+                    return f"line {number} holds {cell[:40]!r}; {REMEDY}", None
+    return f"cannot be read as a table ({exc})", None
 
 
 def _quoted(cell: str) -> str:
@@ -527,7 +566,7 @@ def _format(packed: bool, contents: dict[str, Content], also: tuple[str, ...] = 
             return None
         with _damage_named(path):
             layout = _layout(path, packed)
-        return None if layout.groups else csv_pieces(path, packed, asked.rate, asked.gaps, layout)
+        return None if layout.groups else csv_pieces(path, packed, asked.rate, asked.gaps, layout, asked.channels)
 
     def write(record: Record, path: Path, progress: Progress | None) -> None:
         write_csv(record, path, packed, progress)

@@ -7,19 +7,21 @@ import logging
 import math
 import struct
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gearmbs.files import json_value
 from gearmbs.signals.errors import SignalFileError
 from gearmbs.signals.files.encodings import decoded
-from gearmbs.signals.files.own_clocks import checked_same
+from gearmbs.signals.files.own_clocks import SLOW_SAID, checked_same, interpolated, leading, same_length, times_by_count
 from gearmbs.signals.files.table import Content, Format, begins_with
-from gearmbs.signals.signal.labels import SLOW_ROLES, SLOW_SAID, role_of, tells_time
+from gearmbs.signals.signal.labels import name_and_unit, tells_time
 from gearmbs.signals.signal.record import (
+    SAME_START,
     RateCandidate,
     Record,
     chosen_rate,
@@ -201,150 +203,206 @@ def _read(
     _check_segments(path)
     try:
         with open(path, "rb") as raw, nptdms.TdmsFile.open(raw) as file:
-            kept, names = _chosen(path, file, channels)
-            own = "attrs" in file.properties and "sampling_rate" in file.properties
-            found = {} if own else {name: _own_times(file, c) for name, c in zip(names, kept, strict=True)}
-            clocks = {name: times for name, times in found.items() if times is not None}
-            count = max(len(c) for c in kept)
+            chosen = _chosen(path, file, channels)
+            record, slower = _without_samples(path, file, chosen, rate)
+            fast = next(i for i in range(len(chosen)) if i not in slower)
+            count = len(chosen[fast].channel)
             for start in range(0, count, block or count):
-                stop = min(start + (block or count), count)
-                values = np.stack([_stretch(c, start, stop, count) for c in kept], axis=1)
-                yield _record(path, values, kept, names, file, rate, clocks), stop / count
+                at = np.arange(start, min(start + (block or count), count))
+                columns = [
+                    np.interp(at, *slower[i]) if i in slower else np.asarray(c.channel[at[0] : at[-1] + 1], dtype=float)
+                    for i, c in enumerate(chosen)
+                ]
+                yield replace(record, values=np.stack(columns, axis=1)), (at[-1] + 1) / count
     except SignalFileError:
         raise
     except Exception as exc:
         raise SignalFileError(path, f"cannot be read as TDMS ({exc})") from exc
 
 
-def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> tuple[list[Any], list[str]]:
-    """The channels that become the record's and their names; SignalFileError if they do not make one.
+class _Channel(NamedTuple):
+    """A channel of a TDMS file, with the name and unit that it has here."""
 
-    Channels of equal names in different groups are called group/channel.
+    channel: Any
+    name: str
+    unit: str
+
+
+def _chosen(path: Path, file: Any, channels: Sequence[str] | None) -> list[_Channel]:
+    """Return the channels that become the record's; SignalFileError if there are none.
+
+    Channels of equal names in different groups are called group/channel. A unit at the end of a name, as in "a [g]", is
+    that of the channel if no property names one; asked for by its whole name, a channel keeps that.
     """
-    found = [
+    groups = [
         (group.name, c)
         for group in file.groups()
         for c in group.channels()
         if len(c) and np.issubdtype(c.dtype, np.number) and not np.issubdtype(c.dtype, np.complexfloating)
         if str(c.properties.get("wf_xunit_string", "")).strip().lower() not in OF_FREQUENCY
     ]
-    plain_names = [c.name for _, c in found]
-    names = [c.name if plain_names.count(c.name) == 1 else f"{group}/{c.name}" for group, c in found]
-    kept = [
-        (name, c)
-        for name, (group, c) in zip(names, found)
-        if channels is None or name in channels or f"{group}/{c.name}" in channels
-    ]
+    told = [_name_and_unit(c)[0] for _, c in groups]
+    bare = [name if told.count(name) == 1 else c.name for name, (_, c) in zip(told, groups, strict=True)]
+    found = []
+    for name, (group, c) in zip(bare, groups, strict=True):
+        whole = f"{group}/{c.name}"
+        named = name if bare.count(name) == 1 else whole
+        asked = next((n for n in (named, c.name, whole) if n in (channels or ())), None)
+        if asked == c.name and sum(c.name == other.name for _, other in groups) > 1:
+            asked = None
+        found.append((asked, _Channel(c, asked or named, _name_and_unit(c)[1])))
+    kept = [c for asked, c in found if channels is None or asked is not None]
     if not kept:
-        listed = f"; it holds {', '.join(names) or 'none'}"
+        listed = f"; it holds {', '.join(c.name for _, c in found) or 'none'}"
         raise SignalFileError(
             path, f"holds no samples over time{'' if channels is None else f' in {list(channels)}'}{listed}"
         )
-    kept = [(name, c) for name, c in kept if name in (channels or ()) or not _holds_times(c)] or kept
-    longest = max(len(c) for _, c in kept)
-    if any(len(c) < longest and not _is_slow(c) for _, c in kept):
-        listed = ", ".join(f"{name} ({len(c)})" for name, c in kept)
-        raise SignalFileError(
-            path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
-        )
-    wanted = {f"{group}/{c.name}" for group, c in found} & set(channels or ())
-    return [c for _, c in kept], [
-        f"{c.group_name}/{c.name}" if f"{c.group_name}/{c.name}" in wanted else name for name, c in kept
-    ]
+    return [c for c in kept if c.name in (channels or ()) or not _holds_times(c.channel)] or kept
 
 
-def _unit_of(channel: Any) -> str:
-    """Return the unit of a channel, under either name that LabVIEW writes."""
+def _name_and_unit(channel: Any) -> tuple[str, str]:
+    """Return the name of a channel and its unit, under either name that LabVIEW writes, or at the end of its name."""
     told = (str(channel.properties.get(name) or "").strip() for name in ("unit_string", "NI_UnitDescription"))
-    return next(filter(None, told), UNKNOWN_UNITS)
+    unit = next(filter(None, told), None)
+    return name_and_unit(channel.name) if unit is None else (channel.name, unit)
 
 
 def _holds_times(channel: Any) -> bool:
     """Return whether a channel holds the times of the others of its group."""
-    return channel.dtype.kind == "M" or tells_time(channel.name, _unit_of(channel))
+    return channel.dtype.kind == "M" or tells_time(*_name_and_unit(channel))
 
 
-def _own_times(file: Any, channel: Any) -> np.ndarray | None:
-    """Return the times (s) that a channel of the same group and length holds, or None."""
+def _clock_of(file: Any, channel: Any) -> Any:
+    """Return the channel of the same group and length that holds the times of one, or None."""
     group = file[channel.group_name].channels()
     clock = next((c for c in group if len(c) == len(channel) > 1 and c is not channel and _holds_times(c)), None)
-    if clock is None or clock.dtype.kind not in "Mfiu" or _holds_times(channel):
-        return None
-    return in_seconds(np.asarray(clock[:]), _unit_of(clock), clock.name)
+    return None if clock is None or clock.dtype.kind not in "Mfiu" or _holds_times(channel) else clock
 
 
-def _is_slow(channel: Any) -> bool:
-    """Return whether a channel may have fewer samples than those it stands beside."""
-    return role_of(channel.name, _unit_of(channel)) in SLOW_ROLES
+def _times_of(clock: Any, first: Any = None) -> np.ndarray:
+    """Return the times (s) that a channel holds: stamps from the first of another such channel on, if there is one."""
+    name, unit = _name_and_unit(clock)
+    values = np.asarray(clock[:])
+    if values.dtype.kind != "M":
+        return in_seconds(values, unit, name)
+    begin = values[0] if first is None or first.dtype.kind != "M" else np.asarray(first[:1])[0]
+    return in_seconds(values - begin)
 
 
-def _start_of(channel: Any) -> float:
-    """Return when a channel begins, s: its own time and what it is offset by."""
-    stamp = channel.properties.get("wf_start_time")
-    begin = 0.0 if stamp is None else float(np.datetime64(stamp, "us").astype("int64")) * 1e-6
-    return begin + float(channel.properties.get("wf_start_offset", 0.0))
+def _begin(channel: Any, other: Any) -> float:
+    """Return when a channel begins, s: what it is offset by, and its time from that of another if both have one."""
+    stamps = [each.properties.get("wf_start_time") for each in (channel, other)]
+    first, second = (None if stamp is None else np.datetime64(stamp, "us").astype("int64") for stamp in stamps)
+    apart = 0.0 if first is None or second is None else float(first - second)
+    return 1e-6 * apart + float(channel.properties.get("wf_start_offset", 0.0))
 
 
-def _stretch(channel: Any, start: int, stop: int, count: int) -> np.ndarray:
-    """Return samples of a channel, those of a slow one interpolated."""
-    if len(channel) == count:
-        return np.asarray(channel[start:stop], dtype=float)
-    own = np.asarray(channel[:], dtype=float)
-    return np.interp(np.arange(start, stop) / (count - 1), np.linspace(0.0, 1.0, own.size), own)
+Slower = dict[int, tuple[np.ndarray, np.ndarray]]
+"""By the place of a slower channel where its samples stand among those of the others, and the samples."""
 
 
-def _record(
-    path: Path,
-    values: np.ndarray,
-    kept: Sequence[Any],
-    names: list[str],
-    file: Any,
-    given: float | None,
-    clocks: dict[str, np.ndarray],
-) -> Record:
+def _without_samples(path: Path, file: Any, chosen: Sequence[_Channel], given: float | None) -> tuple[Record, Slower]:
+    """Return what a file says of its channels, and the samples of those of other times than the vibration's.
+
+    Raises
+    ------
+    SignalFileError
+        If vibration has several rates, starts or lengths.
+    """
     root = dict(file.properties)
+    own = "attrs" in root and "sampling_rate" in root
+    names, sizes = [c.name for c in chosen], [len(c.channel) for c in chosen]
+    fast = leading(names, [c.unit for c in chosen], sizes)
+    clocks = {} if own else {c.name: clock for c in chosen if (clock := _clock_of(file, c.channel)) is not None}
     notes: list[str] = []
     rates: dict[str, float | None] = {}
-    speed = float(root["speed"]) if isinstance(root.get("speed"), (int, float)) else None
-    longest = max(len(c) for c in kept)
-    slow = [name for name, c in zip(names, kept, strict=True) if len(c) < longest]
-    starts = {
-        name: _start_of(channel)
-        for name, channel in zip(names, kept, strict=True)
-        if name not in slow and "wf_increment" in channel.properties
-    }
-    notes += [SLOW_SAID.format(name=name, size=longest) for name in slow]
-    for name, channel in zip(names, kept):
-        if name in slow:
-            continue
+    times: dict[str, np.ndarray] = {}
+    for channel, name, _ in (chosen[i] for i in fast):
         rates[name], said = _rate(path, file, channel, root, given)
         if name in clocks:
+            times[name] = _times_of(clocks[name])
             known = rates[name]
-            by_times = rate_by_times(clocks[name], path, given, others=known is not None)
-            own = [] if known is None else [RateCandidate(f"the rate of {name}", known)]
-            own += [] if by_times is None else [RateCandidate("its channel of times", by_times)]
-            rates[name], more = chosen_rate(path, own, given)
+            by_times = rate_by_times(times[name], path, given, others=known is not None)
+            both = [] if known is None else [RateCandidate(f"the rate of {name}", known)]
+            both += [] if by_times is None else [RateCandidate("its channel of times", by_times)]
+            rates[name], more = chosen_rate(path, both, given)
             said = [*said, *more]
         notes += [note for note in said if note not in notes]
-    rate = same_rate(path, rates)
-    begins = {name: float(clocks[name][0]) for name in names if name in clocks and name not in slow}
-    for begin in (starts, begins):
-        same_start(path, begin, rate)
+    same_length(path, {names[i]: sizes[i] for i in fast}, rates)
+    rate, base = same_rate(path, rates), chosen[fast[0]]
+    stepped = [chosen[i] for i in fast if "wf_increment" in chosen[i].channel.properties]
+    for begins in (
+        {c.name: _begin(c.channel, base.channel) for c in stepped},
+        {name: float(own[0]) for name, own in times.items()},
+    ):
+        same_start(path, begins, rate)
+    offset = float(base.channel.properties.get("wf_start_offset", 0.0))
+    start = float(times[base.name][0]) if base.name in times else offset
+    slower: Slower = {}
+    for i in (i for i in range(len(chosen)) if i not in fast):
+        found = _slower(path, file, chosen[i], base, clocks, given if rate is None else rate, start, sizes[fast[0]])
+        if found is not None:
+            slower[i], words = found
+            notes.append(words)
+    speed = float(root["speed"]) if isinstance(root.get("speed"), (int, float)) else None
     if speed is None:
-        speed, said = speed_of({**root, **dict(file[kept[0].group_name].properties)})
+        speed, said = speed_of({**root, **dict(file[chosen[0].channel.group_name].properties)})
         notes += said
     teeth = root.get("teeth")
     return Record(
-        values,
-        list(names),
-        [_unit_of(c) for c in kept],
+        np.empty((0, len(chosen))),
+        names,
+        [c.unit for c in chosen],
         rate,
-        float(kept[0].properties.get("wf_start_offset", begins.get(names[0], 0.0))),
+        offset if "wf_start_offset" in base.channel.properties else start,
         speed,
         None if teeth is None else check_teeth(json.loads(str(teeth))),
         json.loads(root.get("attrs", "{}")),
         notes,
-    )
+    ), slower
+
+
+def _slower(
+    path: Path,
+    file: Any,
+    chosen: _Channel,
+    base: _Channel,
+    clocks: Mapping[str, Any],
+    rate: float | None,
+    start: float,
+    count: int,
+) -> tuple[tuple[np.ndarray, np.ndarray], str] | None:
+    """Return where the samples of a channel of other times stand among those of the others, and what to say of it.
+
+    None of one that has the times of the others (`count` of them, at a `rate` in Hz from `start`, s).
+    """
+    channel, name, _ = chosen
+    size, times = len(channel), None
+    if rate is not None and name in clocks:
+        times = _times_of(clocks[name], clocks.get(base.name))
+    elif rate is not None and (own := _own_rate(path, file, channel, base.channel)) is not None:
+        times = _begin(channel, base.channel) + np.arange(size) / own
+    if times is None or rate is None:
+        if size == count:
+            return None
+        at, how = times_by_count(size, count)
+        return (at, np.asarray(channel[:], dtype=float)), SLOW_SAID.format(name=name, size=count, how=how)
+    at = (times - start) * rate
+    if size == count and np.abs(at[[0, -1]] - [0.0, count - 1.0]).max() < SAME_START:
+        return None
+    values = np.asarray(channel[:], dtype=float)
+    # the ends of the others say whether it is known there
+    _, words = interpolated(path, name, start + np.array([0.0, count - 1.0]) / rate, times, values)
+    return (at, values), words
+
+
+def _own_rate(path: Path, file: Any, channel: Any, base: Any) -> float | None:
+    """Return the rate that a channel itself names, or its group, if this is not that of the others."""
+    named = [channel.properties]
+    if channel.group_name != base.group_name:
+        named.append(file[channel.group_name].properties)
+    found = (chosen_rate(path, rate_candidates(dict(properties)))[0] for properties in named)
+    return next((rate for rate in found if rate is not None), None)
 
 
 def _rate(path: Path, file: Any, channel: Any, root: dict, given: float | None) -> tuple[float | None, list[str]]:

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.own_clocks import checked_same, interpolated, leading
 from gearmbs.signals.files.table import Content, Format, begins_with
-from gearmbs.signals.signal.labels import SLOW_ROLES, role_of
 from gearmbs.signals.signal.record import Record, rate_from_times
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 
@@ -50,23 +50,32 @@ def read_mdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
         raise SignalFileError(
             path, f"holds no samples over time; it holds {', '.join(c.name for c in found) or 'none'}"
         )
-    fast = [c for c in kept if role_of(c.name, c.unit) not in SLOW_ROLES] or kept
+    names, in_units = [c.name for c in kept], [c.unit for c in kept]
+    fast = [kept[i] for i in leading(names, in_units, [c.times.size for c in kept])]
     base = max(fast, key=lambda c: c.times.size).times
-    others = [c for c in fast if not np.array_equal(c.times, base)]
-    if others:
+    if any(not np.array_equal(c.times, base) for c in fast):
+        checked_same(path, {c.name: c.times for c in fast})
         listed = ", ".join(f"{c.name} ({c.times.size} samples)" for c in fast)
         raise SignalFileError(
             path, f"holds records at different times: {listed}; choose with channels=[...] (--channel)"
         )
-    slow = [c.name for c in kept if not np.array_equal(c.times, base)]
     rate, said = _rate(path, base, rate)
+    columns = []
+    for c in kept:
+        if np.array_equal(c.times, base):
+            columns.append(c.values)
+            continue
+        there = np.isfinite(c.values)
+        column, words = interpolated(path, c.name, base, c.times[there], c.values[there])
+        columns.append(column)
+        said = [*said, words]
     return Record(
-        np.stack([np.interp(base, c.times, c.values) if c.name in slow else c.values for c in kept], axis=1),
-        [c.name for c in kept],
-        [c.unit for c in kept],
+        np.stack(columns, axis=1),
+        names,
+        in_units,
         rate,
         float(base[0]),
-        notes=[*said, *(f"{name} has times of its own; between them it is interpolated." for name in slow)],
+        notes=said,
     )
 
 

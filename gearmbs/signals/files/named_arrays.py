@@ -9,19 +9,16 @@ from typing import Any
 import numpy as np
 
 from gearmbs.signals.errors import SignalError, SignalFileError
-from gearmbs.signals.files.own_clocks import checked_same, interpolated
+from gearmbs.signals.files.own_clocks import SLOW_SAID, checked_same, interpolated, same_length, times_by_count
 from gearmbs.signals.files.scales import named_factors, scale_told
 from gearmbs.signals.signal.labels import (
     CLOCK_NAMES,
-    SLOW_ROLES,
-    SLOW_SAID,
     is_clock,
     key_of,
+    may_be_slow,
     may_be_times,
     rises_evenly,
-    role_of,
     tells_time,
-    words_of,
 )
 from gearmbs.signals.signal.record import (
     AGREE,
@@ -39,6 +36,7 @@ from gearmbs.signals.signal.record import (
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth
 from gearmbs.signals.signal.times import in_seconds, seconds_of
+from gearmbs.signals.signal.words import words_of
 
 OF_TIMES = ("timeunit", "timeunits", "unittime", "unitoftime", "tunit", "tunits", "xunit", "xunits", "zeiteinheit")
 """Names of texts that tell the unit of times beside them."""
@@ -102,14 +100,13 @@ def assemble(
         factors = named_factors(_beside(scalars, key, homes), words_of(_bare(key, homes)))
         scaled = scale_told(name, column_units[name], columns[name], factors)
         notes += [] if scaled is None else [scaled]
-    slow, said = _slow_ones_stretched(path, columns, column_units, own)
+    slow, said = _slow_ones_stretched(path, columns, column_units, own, _rates_beside(scalars, owner))
     notes += said
     lengths = {name: column.size for name, column in columns.items()}
-    if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{name} ({size})" for name, size in lengths.items())
-        raise SignalFileError(
-            path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
-        )
+    sizes = {n: size for n, size in lengths.items() if n not in slow}
+    vibration = {n: size for n, size in sizes.items() if not may_be_slow(n, column_units[n])} or sizes
+    same_length(path, vibration, {n: r for n, r in _rates_beside(scalars, owner).items() if n in vibration})
+    same_length(path, lengths)
     rates: dict[str, float | None] = {}
     for name, key in owner.items():
         if name in slow:
@@ -261,19 +258,32 @@ def _rate_beside_times(
     return rate if chosen is None else chosen, said
 
 
+def _rates_beside(scalars: Mapping[str, Any], owner: Mapping[str, str]) -> dict[str, float]:
+    """Return the rates (Hz) that stand beside channels themselves."""
+    found = {}
+    for name, key in owner.items():
+        beside = {k: v for k, v in scalars.items() if k.rpartition(".")[0] == key}
+        sure = [candidate.rate for candidate in rate_candidates(beside) if not candidate.weak]
+        if sure:
+            found[name] = sure[0]
+    return found
+
+
 def _slow_ones_stretched(
     path: Path,
     columns: dict[str, np.ndarray],
     units: Mapping[str, str],
     clocks: Mapping[str, np.ndarray],
+    rates: Mapping[str, float],
 ) -> tuple[list[str], list[str]]:
     """Bring speeds and temperatures of other times to those of all others in place; which, and what to say."""
-    slow = {name for name in columns if role_of(name, units[name]) in SLOW_ROLES}
+    slow = {name for name in columns if may_be_slow(name, units[name])}
     sizes = {column.size for name, column in columns.items() if name not in slow}
     if len(sizes) != 1:
         return [], []
     (size,) = sizes
     base = next((clocks[name] for name in columns if name not in slow and name in clocks), None)
+    rate = next((rates[name] for name in columns if name not in slow and name in rates), None)
     stretched, notes = [], []
     for name in columns:
         own = np.asarray(columns[name], dtype=float)
@@ -284,9 +294,16 @@ def _slow_ones_stretched(
             if own.size == size and _same(times, base):
                 continue
             columns[name], words = interpolated(path, name, base, times, own)
+        elif rate is not None and name in rates:
+            if own.size == size and abs(rates[name] / rate - 1.0) <= AGREE:
+                continue
+            begin = 0.0 if base is None else float(base[0])
+            at = np.arange(size) / rate if base is None else base
+            columns[name], words = interpolated(path, name, at, begin + np.arange(own.size) / rates[name], own)
         elif own.size < size:
-            words = SLOW_SAID.format(name=name, size=size)
-            columns[name] = np.interp(np.linspace(0.0, 1.0, size), np.linspace(0.0, 1.0, own.size), own)
+            times, how = times_by_count(own.size, size)
+            words = SLOW_SAID.format(name=name, size=size, how=how)
+            columns[name] = np.interp(np.arange(size), times, own)
         else:
             continue
         stretched.append(name)

@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.signal.labels import may_be_times, role_of, words_of
+from gearmbs.signals.signal.labels import may_be_slow, may_be_times
 from gearmbs.signals.signal.record import REMEDY, checked_gaps, mean_rate, same_rate, same_start
 from gearmbs.signals.signal.times import in_seconds
+from gearmbs.signals.signal.words import words_of
 
-STRETCHED = ("speed", "temperature", "share", "frequency")
-"""What is interpolated to the times of the others."""
 FEWEST = 2
 """Times that a column has at least."""
+SLOW_SAID = "{name} has fewer samples than the {size} of the others ({how}); between them it is interpolated."
 COVERED = 0.5
 """Share of the record over which a slow channel must be known."""
 NUMBERS_ROWS = frozenset(("", "index", "idx", "nr", "no", "row", "sample", "unnamed"))
@@ -108,7 +108,7 @@ def on_one_clock(
     """
     asked = [Group(g.clock, tuple(i for i in g.columns if channels is None or names[i] in channels)) for g in groups]
     kept = [group for group in asked if group.columns] or list(groups)
-    vibration = {g: [i for i in g.columns if role_of(names[i], units[i]) not in STRETCHED] for g in kept}
+    vibration = {g: [i for i in g.columns if not may_be_slow(names[i], units[i])] for g in kept}
     fast = [group for group in kept if vibration[group]] or kept[:1]
     base = fast[0]
     times: dict[Group, np.ndarray] = {}
@@ -153,17 +153,40 @@ def checked_same(path: Path, times: Mapping[str, np.ndarray]) -> None:
     rates: dict[str, float | None] = {name: mean_rate(own) for name, own in times.items()}
     rate = same_rate(path, rates)
     same_start(path, {name: float(own[0]) for name, own in times.items()}, rate)
-    if len({own.size for own in times.values()}) > 1:
-        listed = ", ".join(f"{name} ({own.size})" for name, own in times.items())
+    same_length(path, {name: own.size for name, own in times.items()})
+
+
+def same_length(path: Path, sizes: Mapping[str, int], rates: Mapping[str, float | None] | None = None) -> None:
+    """Refuse channels of different lengths, by their rates (Hz) where these differ."""
+    if len(set(sizes.values())) > 1:
+        same_rate(path, rates or {})
+        listed = ", ".join(f"{name} ({size})" for name, size in sizes.items())
         raise SignalFileError(
             path, f"holds records of different lengths: {listed}; choose with channels=[...] (--channel)"
         )
 
 
+def leading(names: Sequence[str], units: Sequence[str], sizes: Sequence[int]) -> list[int]:
+    """Return the places of the channels to whose times the others are brought: vibration, or else the longest ones."""
+    slow = [may_be_slow(name, unit) for name, unit in zip(names, units, strict=True)]
+    return [i for i, size in enumerate(sizes) if not slow[i] or (all(slow) and size == max(sizes))]
+
+
+def times_by_count(size: int, count: int) -> tuple[np.ndarray, str]:
+    """Return where the samples of a slower channel stand among those of the others, and in words how it is known.
+
+    Each is the first of as many of the others as go into one; where none fit, the first and the last are taken to be
+    those of the others.
+    """
+    if count % size == 0:
+        return np.arange(size) * float(count // size), f"its samples are those of each {count // size} of the others"
+    return np.linspace(0.0, count - 1.0, size), "its first and last sample are taken to be those of the others"
+
+
 def interpolated(
     path: Path, name: str, base: np.ndarray, times: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, str]:
-    """Return a slow channel at the times of the others, and what is to be said of it; its ends hold.
+    """Return a slow channel at the times of the others, or at the ends of these, and what is said of it; its ends hold.
 
     Parameters
     ----------

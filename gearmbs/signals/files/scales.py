@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from gearmbs.signals.signal.labels import folded, words_of
 from gearmbs.signals.signal.record import number_of
 from gearmbs.signals.signal.units import ELECTRICAL
+from gearmbs.signals.signal.words import folded, words_of
 
 FACTORS = frozenset(
     (

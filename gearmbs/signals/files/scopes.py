@@ -11,7 +11,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gearmbs.signals.files.text_tables import CsvLayout, is_number, split_cells
+from gearmbs.signals.files.cells import is_number, split_cells
+from gearmbs.signals.files.text_tables import CsvLayout
 from gearmbs.signals.signal.labels import name_and_unit, unique_names
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 

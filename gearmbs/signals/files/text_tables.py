@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
-import csv
+import gzip
 import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.files.cells import of_24_hours
+from gearmbs.signals.files.beside_words import columns_of_words, find_beside_words
+from gearmbs.signals.files.cells import (
+    COMMENT,
+    DURATION,
+    SEPARATIONS,
+    Kind,
+    cell_kind,
+    is_number,
+    of_24_hours,
+    split_cells,
+)
 from gearmbs.signals.files.own_clocks import Group
 from gearmbs.signals.signal.labels import (
     is_clock,
     is_unit_of_column,
+    may_be_slow,
     name_and_unit,
     rises_evenly,
     role_of,
@@ -28,34 +39,16 @@ from gearmbs.signals.signal.labels import (
 )
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS
 from gearmbs.signals.signal.times import EPOCHS, LARGEST, SECONDS, seconds_of
+from gearmbs.signals.signal.units import is_unit
 from gearmbs.wording import of_adams
 
 HEAD_LINES = 400
-COMMENT = re.compile(r"^\s*[#%]")
 KEY_VALUE = re.compile(r"^\s*[#%]*\s*[\"']?([^\W\d][^:=;,\t\"]*?)[\"']?\s*(?:[:=][\s,;]*|[,;\t]\s*)(.*?)[\s,;\"']*$")
-GAP_CELLS = frozenset(
-    {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf", "∞", "-∞", "+∞"}
-)
-DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.](?:\d{1,2}|[A-Za-z]{3})[-/.]\d{4})"
-CLOCK = r"(?:\d+ days? )?\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?: ?[AaPp]\.?[Mm]\.?)?(?:Z|[+-]\d{2}:?\d{2})?"
-DURATION = re.compile(r"^([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?) ?(ms|sec|s|min|hr|days|day)$")
-"""As MATLAB writes times of a timetable."""
-STAMPS: tuple[tuple[str, re.Pattern[str]], ...] = (
-    ("stamp", re.compile(rf"^{DATE}[T ]{CLOCK}$")),
-    ("date", re.compile(rf"^{DATE}$")),
-    ("clock", re.compile(rf"^{CLOCK}$")),
-    ("clock", DURATION),
-)
-SEPARATIONS: tuple[tuple[str | None, str], ...] = (
-    (";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (",", ","), (None, "."), (None, ","),
-)  # fmt: skip
-"""Commas between numbers with decimal commas are those of quoted cells."""
 TIME_UNITS = frozenset(("s", "sec", "ms", "us", "µs", "ns"))
 INDEX_NAMES = frozenset(
     {"", "unnamed: 0", "index", "idx", "sample", "samples", "nr", "no", "no.", "#", "row", "level_0"}
 )
 NO_UNIT = frozenset(("-", "--", "\u2013", "[-]", "(-)"))
-Kind = Literal["number", "gap", "stamp", "date", "clock", "text"]
 
 
 @dataclass(frozen=True)
@@ -112,10 +105,14 @@ class CsvLayout:
 
     @property
     def slow(self) -> tuple[int, ...]:
-        """Columns of speeds, pulses and temperatures, which may be written in some rows only; and `own`."""
+        """Columns of speeds, pulses, temperatures and loads, which may be written in some rows only; and `own`."""
         named = zip(self.names, self.units, strict=True)
         apart = {self.clock, *self.beside}
-        told = [i for i, (name, unit) in enumerate(named) if role_of(name, unit) is not None and i not in apart]
+        told = [
+            i
+            for i, (name, unit) in enumerate(named)
+            if i not in apart and (role_of(name, unit) is not None or may_be_slow(name, unit))
+        ]
         return tuple(dict.fromkeys([*told, *self.own]))
 
 
@@ -143,7 +140,7 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         kinds = kinds[::2]
         notes.append(f"{seen}: each second comma is read as that of a number, {pointed(head[first]).strip()[:60]!r}.")
     width = len(kinds)
-    head = _without_types(head[:first], separator)
+    below, head = head[first:], _without_types(head[:first], separator)
     labels, header_line = _labels(head, separator, width)
     units_row = None
     bare = [name_and_unit(label) for label in labels] if labels else []
@@ -154,9 +151,12 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
     else:
         names = [name for name, _ in bare] or [f"ch{i + 1}" for i in range(width)]
         units = [unit for _, unit in bare] or [UNKNOWN_UNITS] * width
-    stamps = tuple(i for i, kind in enumerate(kinds) if kind in ("stamp", "date", "clock"))
+    beside = () if notes else columns_of_words(below, separator, decimal, kinds)
+    stamps = tuple(i for i, kind in enumerate(kinds) if kind in ("stamp", "date", "clock") and i not in beside)
     empty = tuple(
-        i for i, kind in enumerate(kinds) if kind == "gap" and i == width - 1 and not (labels and names[i].strip())
+        i
+        for i, kind in enumerate(kinds)
+        if kind == "gap" and i == width - 1 and i not in beside and not (labels and names[i].strip())
     )
     if units[0].lower() in ("", UNKNOWN_UNITS) and names[0].strip().lower() in TIME_UNITS:
         names, units = ["time", *names[1:]], [names[0].strip(), *units[1:]]
@@ -178,10 +178,11 @@ def find_layout(head: list[str], path: Path) -> CsvLayout:
         _metadata(head, separator, header_line),
         clock,
         stamps,
-        index if index != clock else None,
+        index if index != clock and index not in beside else None,
         empty,
         notes,
         headings > 1,
+        beside=beside,
     )
 
 
@@ -208,40 +209,6 @@ def _without_types(head: Sequence[str], separator: str | None) -> list[str]:
     ]
 
 
-def cell_kind(cell: str, decimal: str) -> Kind:
-    """What a cell holds: a number, a gap, a time stamp, a date, a time of day, or text."""
-    text = cell.strip().strip('"').strip()
-    if text.lower() in GAP_CELLS:
-        return "gap"
-    if is_number(text, decimal):
-        return "number"
-    for kind, pattern in STAMPS:
-        if pattern.match(text):
-            return kind  # type: ignore[return-value]
-    return "text"
-
-
-def is_number(cell: str, decimal: str) -> bool:
-    """True for a number with this decimal sign."""
-    try:
-        float(cell.replace(",", ".") if decimal == "," else cell)
-    except ValueError:
-        return False
-    return "_" not in cell
-
-
-def split_cells(line: str, separator: str | None) -> list[str]:
-    """The cells of a line."""
-    line = line.strip("\r\n") if separator == "\t" else line.strip()
-    if separator == ",":
-        try:
-            return [cell.strip() for cell in next(csv.reader([line]))]
-        except (StopIteration, csv.Error):
-            return []
-    cells = [cell.strip().strip('"') for cell in line.split(separator)]
-    return cells[:-1] if separator is not None and cells and cells[-1] == "" else cells
-
-
 def _find_numbers(head: list[str], path: Path) -> tuple[int, str | None, str, list[Kind]]:
     rows = [(i, line) for i, line in enumerate(head) if line.strip() and not COMMENT.match(line)]
     fallback = None
@@ -262,6 +229,8 @@ def _find_numbers(head: list[str], path: Path) -> tuple[int, str | None, str, li
     # a table whose second row is damaged is still a table: the row that is wrong is named when it is read
     if fallback is not None and (len(fallback[3]) > 1 or fallback[0] == (rows[0][0] if rows else 0)):
         return fallback
+    if (beside := find_beside_words(rows)) is not None:
+        return beside
     sample = next((line.strip() for line in head if line.strip()), "")
     if not sample:
         raise SignalFileError(path, "holds nothing but empty lines")
@@ -358,6 +327,11 @@ def _units_row(
     if len(upper) == width and all(map(is_unit_of_column, upper)) and not any(map(is_unit_of_column, plain)):
         # units above the names
         return plain, upper
+    if len(upper) == width > 1 and is_clock(upper[0]) and plain[0].lower() in SECONDS:
+        # below the time its unit: so are the others those of their columns, also units of no vibration
+        others = [unit for unit in plain[1:] if unit]
+        if 2 * sum(is_unit_of_column(unit) or is_unit(unit) for unit in others) >= max(1, len(others)):
+            return upper, [unit or UNKNOWN_UNITS for unit in plain]
     counted = bool(upper) and upper[0].strip().lower() in INDEX_NAMES and any(plain)
     stated = (plain[0] or counted) and all(not unit or is_unit_of_column(unit) for unit in plain)
     # of a row of units alone the names above need not begin with the time's
@@ -401,6 +375,38 @@ def _values(key: str, text: str, separator: str | None) -> Sequence[tuple[str, s
     if len(set(cells)) == 1:
         return [(key, cells[0])]
     return [(f"{key} {i + 1}" if i else key, cell) for i, cell in enumerate(cells)]
+
+
+# The end of a text, where it may be cut off.
+
+
+TAIL, TAIL_READ = 1 << 14, 1 << 20
+"""Bytes at the end of a text that are looked at, and that are read at once to come there."""
+
+
+def last_lines(path: Path, packed: bool) -> tuple[bool, list[str]]:
+    """Return whether the last line of a text has an end, and its last lines with numbers."""
+    tail = b""
+    with path.open("rb") as raw:
+        if packed:
+            with gzip.GzipFile(fileobj=raw) as stream:
+                while piece := stream.read(TAIL_READ):
+                    tail = (tail + piece)[-TAIL:]
+        else:
+            raw.seek(0, 2)
+            raw.seek(max(0, raw.tell() - TAIL))
+            tail = raw.read()
+    # the second byte of a character of two, or the last three of four
+    ended = tail.rstrip(b"\0").endswith((b"\n", b"\r"))
+    text = tail.replace(b"\0", b"").decode("utf-8", errors="replace")
+    lines = [line for line in text.splitlines()[1:] if line.strip() and not COMMENT.match(line)]
+    return ended, lines
+
+
+def digits_of(cell: str) -> tuple[int, int] | None:
+    """Return how many decimals and characters of an exponent a number has; None for what is no number."""
+    found = re.fullmatch(r"[-+]?\d*(?:[.,](\d*))?([eE][-+]?\d*)?", cell.strip())
+    return None if found is None else (len(found.group(1) or ""), len(found.group(2) or ""))
 
 
 # Columns of times in text tables: seconds, time stamps, dates and times of day; and columns that number the rows.

@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
+from gearmbs.signals.files.own_clocks import interpolated, leading, same_length
 from gearmbs.signals.files.table import Content, Format
-from gearmbs.signals.signal.record import SECONDS, Record
+from gearmbs.signals.signal.record import SECONDS, Record, same_rate, same_start
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, check_teeth, nice_rate
 
 START = re.compile(rb"^\s*-1[ \t]*\r?\n[ \t]*\d+[a-z]?\b")
@@ -85,23 +86,42 @@ def read_uff(path: Path, channels: Sequence[str] | None) -> Record:
     kept = [(n, s) for n, s in zip(names, histories) if channels is None or n in channels]
     if not kept:
         raise SignalFileError(path, f"has no channel {list(channels or [])}; it holds {names}")
-    sizes, clocks = {len(s["data"]) for _, s in kept}, {_clock(s) for _, s in kept}
-    if len(sizes) > 1 or len(clocks) > 1:
-        raise SignalFileError(
-            path, f"its histories differ in length {sizes} or clock {clocks}; choose with channels=[...]"
-        )
-    rate, t0 = clocks.pop()
+    names, units = [n for n, _ in kept], [_unit(s, systems) for _, s in kept]
+    rate, t0, columns, said = _on_one_clock(path, [s for _, s in kept], names, units)
+    notes += said
     extra = _json(kept[0][1]["id4"])
     return Record(
-        np.stack([np.asarray(s["data"], dtype=float) for _, s in kept], axis=1),
-        [n for n, _ in kept],
-        [_unit(s, systems) for _, s in kept],
+        np.stack(columns, axis=1),
+        names,
+        units,
         rate,
         t0,
         extra.get("speed"),
         None if extra.get("teeth") is None else check_teeth(extra["teeth"]),
         notes=notes,
     )
+
+
+def _on_one_clock(
+    path: Path, histories: Sequence[dict], names: Sequence[str], units: Sequence[str]
+) -> tuple[float, float, list[np.ndarray], list[str]]:
+    """Return rate (Hz), start (s) and columns of histories at the times of vibration, and what is said of others."""
+    columns = [np.asarray(s["data"], dtype=float) for s in histories]
+    clocks = [_clock(s) for s in histories]
+    fast = leading(names, units, [column.size for column in columns])
+    rates = {names[i]: clocks[i][0] for i in fast}
+    same_rate(path, rates)
+    rate, t0 = clocks[fast[0]]
+    same_start(path, {names[i]: clocks[i][1] for i in fast}, rate)
+    same_length(path, {names[i]: columns[i].size for i in fast})
+    base, said = t0 + np.arange(columns[fast[0]].size) / rate, []
+    for i, (own, begin) in enumerate(clocks):
+        if i in fast or (columns[i].size == base.size and (own, begin) == (rate, t0)):
+            continue
+        times = begin + np.arange(columns[i].size) / own
+        columns[i], words = interpolated(path, names[i], base, times, columns[i])
+        said.append(words)
+    return rate, t0, columns, said
 
 
 def write_uff(record: Record, path: Path) -> None:

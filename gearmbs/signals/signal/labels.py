@@ -9,7 +9,6 @@ is no vibration is not analysed as one.
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Iterable, Sequence
 from typing import Literal
 
@@ -17,10 +16,11 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import MissingMetadataError, SignalError
-from gearmbs.signals.signal.loads import LOAD_WORDS, is_unit_of_load, load_of, perhaps
+from gearmbs.signals.signal.loads import LOAD_WORDS, SLOW_LOADS, is_unit_of_load, load_of, perhaps
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, shaft_coords, units_of, with_metadata
 from gearmbs.signals.signal.times import SECONDS, SUFFIX
 from gearmbs.signals.signal.units import detected_unit, is_usual, scaled, unit_dimension
+from gearmbs.signals.signal.words import folded, words_of
 
 BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 NAME_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
@@ -28,7 +28,6 @@ QUOTIENT = re.compile(r"^(.*?\S)\s*/\s*(?:\((.+)\)|(\S.*?))\s*$")
 """DIN 461: a quantity by its unit."""
 IN_WORDS = re.compile(r"^(.*?\S)\s+(?:in|en|v)\s+(?:\((.+)\)|(\S+))\s*$", re.IGNORECASE)
 """``t in ms``, in French and Czech ``en`` and ``v``."""
-WORDS_AND_NUMBERS = re.compile(r"[^\W\d_]+|\d+")
 CLOCK_NAMES = frozenset(
     "time t times timesec timeseconds timestamp timestamps zeit zeitpunkt datetime elapsedtime relativetime "
     "xvalue sampletime tempo temps timems timeus cas".split()
@@ -50,6 +49,16 @@ SPEED_COLUMN = re.compile(
     r"shaftfreq|rotation(al)?freq|rotfreq|^f_?rot$|frequencederotation|wellenfreq|" + ANGULAR_COLUMN.pattern
 )
 TRAVEL = frozenset(("km/h", "kmh", "kph", "mph"))
+TRAVEL_COLUMN = re.compile(
+    r"^v?wind\d*$|(wind|vehicle|fahr|vozid|vehicul|belt|band|conveyor|air|luft|flow|strom|fluid|gas|water)\w*"
+    r"(speed|geschw|velocit|vitesse|rychlost)|(speed|geschw|velocit|vitesse|rychlost)\w*(wind|vent|vehic|fahr|vozid|belt|air|flow)"
+)
+"""Speeds of what is no shaft."""
+NO_TRAVEL = re.compile(
+    r"schwing|vib|kmit|lager|bearing|rotor|rotat|shaft|welle|hridel|turbin|generat|motor|engine|spind|pump|press|fan|"
+    r"blow|ventil|gear|getriebe|wheel|pulley|scheibe"
+)
+SPEEDS_OF_TRAVEL = TRAVEL | {"m/s", "ft/s", "m/min", "kn", "kt", "knots"}
 SHAFT_COLUMN = re.compile(r"shaft|welle|hridel|arbre|spindle|spindel|rotor|motor")
 ANGLE_UNITS = frozenset(("deg", "°", "rad", "grad"))
 FORWARD = 0.9
@@ -70,10 +79,9 @@ SLOW = 0.05
 are as large."""
 
 SHARES = frozenset(("%", "percent"))
-Role = Literal["time", "speed", "tacho", "temperature", "count", "angle", "share", "frequency"]
-SLOW_ROLES = ("speed", "temperature")
+Role = Literal["time", "speed", "tacho", "temperature", "count", "angle", "share", "frequency", "travel"]
+SLOW_ROLES = ("speed", "temperature", "share", "frequency", "travel")
 """Columns of these may have fewer samples than the others, and are interpolated."""
-SLOW_SAID = "{name} has fewer samples than the {size} of the others; between them it is interpolated."
 UNIT_ASKED = "The unit of the speed in "
 """Begin of what is said of a speed that cannot be used as its unit is not known."""
 WORDS: dict[str, str] = {
@@ -85,18 +93,17 @@ WORDS: dict[str, str] = {
     "angle": "holds the angle of a shaft",
     "share": "holds percents, as of a load,",
     "frequency": "holds a frequency",
+    "travel": "holds the speed of something that is no shaft",
 }
 
 
-def folded(text: str) -> str:
-    """Return a text in lower case without accents: "Otáčky" as "otacky"."""
-    plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
-    return "".join(c for c in plain if not unicodedata.combining(c)).lower().replace("ω", "omega")
+TOLD_RANGES = ("temperature", "travel")
+"""Of these, as of loads, the report says between what they were."""
 
 
 def key_of(name: str) -> tuple[str, str]:
     """A header's name without case, accents, blanks and path, and the unit in its brackets ("" without one)."""
-    last = re.split(r"[./\\]", name.strip().rstrip(":"))[-1] if not BRACKETS.search(name) else name
+    last = re.split(r"[./\\]", name.strip().rstrip(":."))[-1] if not BRACKETS.search(name) else name
     unit = BRACKETS.search(last)
     bare = re.sub(r"[^a-z0-9]", "", folded(BRACKETS.sub("", last)))
     return bare, unit.group(1).strip() if unit else ""
@@ -112,8 +119,9 @@ def name_and_unit(label: str) -> tuple[str, str]:
     >>> name_and_unit("left/right"), name_and_unit("Y[0]")
     (('left/right', 'unknown'), ('Y[0]', 'unknown'))
     """
-    if label.strip().lower() in TURNS:
-        return label.strip(), label.strip()
+    bare = label.strip()
+    if bare.lower() in TURNS or ("/" in bare and is_unit_of_column(bare)):
+        return bare, bare
     for pattern in (IN_WORDS, QUOTIENT):
         found = pattern.match(label)
         unit = (found.group(2) or found.group(3) or "").strip() if found else ""
@@ -129,17 +137,18 @@ def is_unit_of_column(text: str) -> bool:
     """Return whether a text is a unit that columns of recordings have."""
     low = text.lower()
     rotates = low in RPM_UNITS or low in OF_ROTATION
-    return is_usual(text) or rotates or low in TEMPERATURE_UNITS or low in ("us", "µs") or is_unit_of_load(text)
+    told = low in TEMPERATURE_UNITS or low in TRAVEL or low in ("us", "µs")
+    return told or rotates or is_usual(text) or is_unit_of_load(text)
+
+
+def may_be_slow(name: str, unit: str) -> bool:
+    """Return whether a column may have fewer samples than vibration beside it, and is interpolated then."""
+    return role_of(name, unit) in SLOW_ROLES or load_of(name, unit) in SLOW_LOADS
 
 
 def is_clock(name: str) -> bool:
     """True for the names that columns of times have."""
     return key_of(SUFFIX.sub("", name))[0] in CLOCK_NAMES
-
-
-def words_of(name: str) -> list[str]:
-    """Return the words and the numbers of a name, without the unit of times at its end."""
-    return WORDS_AND_NUMBERS.findall(folded(SUFFIX.sub("", name)))
 
 
 def may_be_times(name: str, unit: str) -> bool:
@@ -191,6 +200,8 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
         or (SHAFT_COLUMN.search(key) and low in HERTZ)
     ):
         return "speed"
+    if TRAVEL_COLUMN.search(key) and not NO_TRAVEL.search(key) and (unknown or low in SPEEDS_OF_TRAVEL):
+        return "travel"
     if low in TRAVEL:
         return "speed"
     if low in SHARES:
@@ -262,6 +273,12 @@ def unit_of_rotation(name: str, unit: str) -> str | None:
 
 def _in_rpm(name: str, unit: str) -> bool:
     return unit == UNKNOWN_UNITS and "rpm" in name.lower()
+
+
+def _range_of(values: np.ndarray, unit: str) -> str:
+    """Return in words between which values a column stays."""
+    low, high = (f"{limit:.4g}" for limit in (np.nanmin(values), np.nanmax(values)))
+    return f", {low if low == high else f'{low} to {high}'}{'' if unit == UNKNOWN_UNITS else f' {unit}'},"
 
 
 def measured(
@@ -353,6 +370,9 @@ def measured(
             if role == "frequency"
         ]
         notes += [f"{p!r} gives the speed: tacho={p!r} and pulses_per_rev (--tacho, --pulses)." for p in pulses]
-    notes += [f"{n!r} {words[n]} and is not analysed as vibration." for n in left_out if n != used_speed]
+    ranges = {n: _range_of(values, unit) for n, unit, values in columns if n in loads or told.get(n) in TOLD_RANGES}
+    notes += [
+        f"{n!r} {words[n]}{ranges.get(n, '')} and is not analysed as vibration." for n in left_out if n != used_speed
+    ]
     left = signal.sel(channel=[name for name in names if name not in left_out or name == used_speed])
     return with_metadata(left, notes=[*left.attrs.get("notes", ()), *notes]), used_speed

@@ -1,18 +1,23 @@
-"""Columns that say how a machine was loaded: torques, forces, currents and powers, told by unit, or else by name."""
+"""Columns that say how a machine ran: torques, forces, currents, powers, pressures, told by unit, or else by name."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Literal
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.units import COUNTS, unit_dimension
+from gearmbs.signals.signal.words import words_of
 
-Load = Literal["torque", "force", "current", "power"]
+Load = Literal["torque", "force", "current", "power", "pressure"]
+SLOW_LOADS = ("torque", "current", "power", "pressure")
+"""Columns of these may have fewer samples than vibration; forces are measured as it is."""
 LOAD_WORDS: dict[Load, str] = {
     "torque": "holds a torque", "force": "holds a force", "current": "holds a current", "power": "holds a power",
+    "pressure": "holds a pressure",
 }  # fmt: skip
-SI: dict[Load, str] = {"torque": "N m", "force": "N", "current": "A", "power": "W"}
+SI: dict[Load, str] = {"torque": "N m", "force": "N", "current": "A", "power": "W", "pressure": "bar"}
 
 _NEWTONS, _METRES = r"(?:k|M|m|da|c|u|µ|μ)?N", r"(?:m|mm|cm)"
 _POUNDS, _FEET = r"(?:k?lbf?s?|ozf?|k?gf|kp)", r"(?:ft|in|m|cm)"
@@ -20,29 +25,35 @@ _BY = r"\s*[ *·.⋅×-]?\s*"
 TORQUE_UNIT = re.compile(rf"^(?:{_NEWTONS}{_BY}{_METRES}|NM)$")
 """Of newtons with a capital, as nm is a nanometre."""
 CUSTOMARY = re.compile(rf"^(?:{_POUNDS}{_BY}{_FEET}|(?:ft|in){_BY}(?:lbf?s?|ozf?))$", re.IGNORECASE)
-UNITS: dict[str, Load] = (
-    dict.fromkeys(("A", "mA", "kA", "uA", "µA", "Amp", "Amps", "amp", "Ampere"), "current")
-    | dict.fromkeys(("W", "kW", "MW", "mW", "VA", "kVA", "hp", "PS"), "power")
-)  # fmt: skip
+_SPELLED: dict[Load, str] = {
+    "current": "A mA kA uA µA Amp Amps amp Ampere",
+    "power": "W kW MW mW VA kVA hp PS",
+    "pressure": "bar mbar hPa kPa MPa psi psig bar(g) barg atm",
+}
+UNITS: dict[str, Load] = {unit: load for load, units in _SPELLED.items() for unit in units.split()}
 
 NAMES: dict[Load, str] = {
     "torque": r"torque|moment|drehmoment|drehmom|couple|koppel|coppia|vridmoment",
     "force": r"force|kraft|effort|sila|fuerza|forza|kraftmessdose",
     "current": r"current|strom|courant|proud|corriente|corrente",
     "power": r"power|leistung|puissance|vykon|potencia|potenza",
+    "pressure": r"pressure|press|druck|pression|tlak|presion|pressione",
 }
 """Without case and accents."""
 BESIDE = (
     r"in|inp|input|out|output|an|ab|antrieb|abtrieb|eingang|ausgang|entree|sortie|drive|driven|driver|motor|moteur|"
     r"engine|generator|shaft|welle|arbre|hridel|brake|brems|bremse|load|last|cell|kroutici|mean|mess|ist|soll|actual|"
-    r"ref|electric|shear|hammer|radial|axial|tangential|normal|phase|ch|channel|sensor|signal|value"
+    r"ref|electric|shear|hammer|radial|axial|tangential|normal|phase|ch|channel|sensor|signal|value|oil|ol|oleje|huile|"
+    r"hydraulic|water|wasser|inlet|outlet|suction|discharge|supply|line|system"
 )
 """What names of loads have besides: where it is, or how it was had."""
 _PART = re.compile(rf"^(?:{BESIDE}|[a-z]|\d+)$")
 _COMPOUND = {load: re.compile(rf"^(?:(?:{BESIDE})s?)*(?:{name})(?:{BESIDE})*$") for load, name in NAMES.items()}
 _LOAD_CELL = ["load", "cell"]
 _WORD = {load: re.compile(rf"^(?:{name})$") for load, name in NAMES.items()}
-OF_VIBRATION = re.compile(r"^a$|acc|beschl|vib|schwing|kmit|disp|weg$|velo|micro|mikro")
+OF_VIBRATION = re.compile(
+    r"^a$|acc|beschl|vib|schwing|kmit|disp|weg$|velo|micro|mikro|^mic|sound|schall|acoust|akust|^son"
+)
 """Words of vibration, of a place that may be called by a load."""
 
 
@@ -61,19 +72,24 @@ def load_of(name: str, unit: str) -> Load | None:
     >>> load_of("M", "Nm"), load_of("Input torque", "unknown"), load_of("Torque side acc", "V")
     ('torque', 'torque', None)
     """
-    unit = unit.strip()
+    unit, words = unit.strip(), words_of(name)
     if is_unit_of_load(unit):
         return "torque"
     if unit in UNITS:
         return UNITS[unit]
+    if unit == "Pa":
+        # of a microphone, unless it is called as nothing but a pressure
+        return "pressure" if _called(words) == "pressure" else None
     if not _says_nothing(unit):
         try:
             return "force" if unit_dimension(unit)[0] == "force" else None
         except SignalError:
             return None
-    words = _words(name)
-    if words[:2] == _LOAD_CELL:
-        return "force"
+    return "force" if words[:2] == _LOAD_CELL else _called(words)
+
+
+def _called(words: Sequence[str]) -> Load | None:
+    """Return which load the words of a name are, if they say nothing else."""
     for load, pattern in _COMPOUND.items():
         said = [pattern.match(word) is not None for word in words]
         if any(said) and all(found or _PART.match(word) for found, word in zip(said, words, strict=True)):
@@ -89,7 +105,7 @@ def perhaps(name: str, unit: str) -> tuple[Load, str] | tuple[None, None]:
     >>> perhaps("Torque arm X", "unknown"), perhaps("Torque side acc", "unknown"), perhaps("Torque arm X", "g")
     (('torque', 'N m'), (None, None), (None, None))
     """
-    words = _words(name)
+    words = words_of(name)
     if unit.strip().lower() not in COUNTS or any(OF_VIBRATION.search(word) for word in words):
         return None, None
     return next(((load, SI[load]) for load, pattern in _WORD.items() if any(map(pattern.match, words))), (None, None))
@@ -97,9 +113,3 @@ def perhaps(name: str, unit: str) -> tuple[Load, str] | tuple[None, None]:
 
 def _says_nothing(unit: str) -> bool:
     return unit.lower() in COUNTS or unit.lower() in ("v", "mv", "uv", "µv")
-
-
-def _words(name: str) -> list[str]:
-    from gearmbs.signals.signal.labels import words_of
-
-    return words_of(name)

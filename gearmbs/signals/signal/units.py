@@ -186,7 +186,7 @@ def check_units(units: Any) -> None:
                 f"units: {text!r} is that of a level, not of samples; give units={bare!r} if these are the samples of "
                 "a waveform; of levels no spectrum can be had"
             )
-        if not _is_unit(text):
+        if not is_unit(text):
             example = "write for example 'm/s^2' or 'g'"
             hint = did_you_mean(text, USUAL, otherwise=example, count=2, alike=0.5, shown=repr)
             raise SignalError(f"units: {text!r} is not a unit; {hint}")
@@ -217,7 +217,8 @@ def is_usual(text: str) -> bool:
     return text in USUAL or text in ALIASES
 
 
-def _is_unit(text: str) -> bool:
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit of anything."""
     clean = text.strip()
     if clean in USUAL or clean in ALIASES or clean in DIMENSIONS.values() or clean.lower() in COUNTS:
         return True
