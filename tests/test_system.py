@@ -55,7 +55,10 @@ MAY = {
 """Uses elsewhere, and why."""
 
 
-THERE = re.compile(rf"\b(?:import|from) (?:{'|'.join(sorted(ONLY_THERE))})\b|\bos\.\w|\bsys\.platform\b|/proc")
+THERE = re.compile(
+    rf"\b(?:import|from) (?:{'|'.join(sorted(ONLY_THERE))})\b|\bos\.(?:{'|'.join(sorted(ONLY_CALLS))}|name)\b"
+    r"|\bsys\.platform\b|/proc"
+)
 """What the text of a module has somewhere if it uses any of these."""
 OPENS = re.compile(r"open\(|read_text\(|write_text\(")
 """The same of one that opens a file as text."""
