@@ -101,3 +101,22 @@ def test_multiples_of_units_are_these(unit, factor):
     with pytest.raises(SignalError, match=says("50 g")):
         unit_dimension("50 g")
     assert name_and_unit(f"a [{unit}]") == ("a", unit)
+
+
+@pytest.mark.parametrize("swing", [0.0, 20.0, 90.0])
+@pytest.mark.parametrize("share", [0.0, 3e-4, -5e-4, 2e-3])
+def test_a_speed_that_is_off_is_calibrated_by_the_mesh_line(swing, share):
+    """23 teeth, cosines of 2 and 1: by column and curve the lines have their heights, steady, swaying or varying."""
+    t = np.arange(38400) / 12800.0
+    rpm = 1500.0 + swing * np.sin(2 * np.pi * 0.4 * t)
+    angle = 2 * np.pi * np.cumsum(rpm / 60.0) / 12800.0
+    noise = 0.3 * np.random.default_rng(1).standard_normal(t.size)
+    table = pd.DataFrame({"time": t, "acc [m/s^2]": 2 * np.cos(23 * angle) + np.cos(46 * angle) + noise})
+    report = analyse(table.assign(**{"speed [rpm]": rpm * (1.0 + share)}), 23)
+    found = report.harmonics["orders"].values[:2, 0]
+    np.testing.assert_allclose(found, [np.sqrt(2.0), np.sqrt(0.5)], rtol=0.02)
+    assert any("calibrated" in note for note in report.notes) == (share != 0.0)
+    # lines of the record's spectrum by which the mesh is off
+    far = abs(share) * 575.0 * 3.0 > 2.0
+    assert any(note.startswith("CHECK THE SPEED") for note in report.notes) == far
+    assert report.speed == pytest.approx(np.pi / 30 * rpm.mean(), rel=5e-5)

@@ -33,7 +33,8 @@ from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.optical import instrument_faults
 from gearmbs.signals.rotation.angular import angular_resample, samples_per_revolution, time_synchronous_average
 from gearmbs.signals.rotation.keywords import SpeedKeywords
-from gearmbs.signals.rotation.shaft import Known, Shaft, compare_with_mesh, known_shaft, mesh_shaft
+from gearmbs.signals.rotation.mesh_shaft import compare_with_mesh, mesh_shaft
+from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft
 from gearmbs.signals.signal.arguments import DataKeywords
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
@@ -318,7 +319,7 @@ def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOpti
         by_orders = sidebands.sel(sideband=0).values
     followed = _in_angle(signal, shaft, counts[0], harmonics, notes)
     source, scale = (signal, 1.0) if followed is None else (followed, shaft.speed / math.tau)
-    if followed is not None:
+    if followed is not None and not shaft.integrated:
         compare_with_mesh(make_signal(followed.values, scale * rate_of(followed)), counts, shaft, notes)
     bands = _band_levels(source, gmf / scale, harmonics, options.half_width, tell)
     tell("lines")

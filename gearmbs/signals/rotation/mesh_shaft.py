@@ -1,0 +1,327 @@
+"""The shaft of a pair by its mesh line, and speeds that are told held against it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+import xarray as xr
+
+from gearmbs.signals.errors import SignalError
+from gearmbs.signals.rotation.angular import angular_resample
+from gearmbs.signals.rotation.phase import phase_from_line, phase_from_speed
+from gearmbs.signals.rotation.rate import MISCOUNTED, other_rate, other_teeth
+from gearmbs.signals.rotation.shaft import SPEED_TOLERANCE, Known, Shaft, known_shaft, remark_plausibility, strays
+from gearmbs.signals.rotation.speed import (
+    HARMONICS,
+    MIN_QUALITY,
+    SAME_COMB,
+    SIDEBANDS,
+    Comb,
+    SpeedEstimate,
+    find_comb,
+    followed_comb,
+    line_near,
+    own_lines_missing,
+)
+from gearmbs.signals.rotation.sweep import remark_sweep, remark_wander
+from gearmbs.signals.signal.signal import make_signal, rate_of, units_of
+
+OTHER_COMB = 0.03
+"""Relative difference of speeds up to which two combs mean one: a little more than `SPEED_TOLERANCE`, within which the
+given one is looked for."""
+LEAST_OFF = 0.05
+"""The same from which an angle is calibrated: sinc of it is 0.4 % of the line."""
+FOLLOWED = 0.1
+"""Turns of the shaft by which the mesh line may wander to be followed; `phase_from_line` follows it by 0.15."""
+LINES_OFF = 2.0
+"""Lines of the whole record's spectrum by which a mesh line may be off: there a Hann window leaves nothing of it."""
+SIDEBAND_TURNS = 0.5
+"""Turns of the shaft beside the expected mesh frequency from which a line is nearer to one of its sidebands."""
+STRONGER_DB = 3.0
+"""By which another comb must be higher to count as stronger: scores of one record scatter by less."""
+SHARED_HARMONIC = 2
+"""Combs of which one has lines in common with the other's harmonics up to this one are not told apart."""
+FOLLOWED_TURNS = 30.0
+"""Revolutions that the filter of `phase_from_line` with its default width takes, 26, and some more to follow."""
+
+
+def mesh_shaft(
+    signal: xr.DataArray, counts: Sequence[int], known: Known, notes: list[str]
+) -> tuple[Shaft, xr.DataArray]:
+    """The shaft of a pair whose tooth counts are known, found from the mesh line where nothing else is known.
+
+    Raises
+    ------
+    SignalError
+        If nothing is known of the speed and no mesh line stands out.
+    """
+    teeth = tuple(counts)
+    found, signal = known_shaft(signal, known)
+    if isinstance(found, float):
+        notes += getattr(known.speed, "attrs", {}).get("notes", ())
+        shaft = _near_speed(signal, teeth, found, notes)
+    elif found is not None:
+        notes += found.phase.attrs.get("notes", ())
+        shaft = _calibrated(signal, teeth, found, notes) if found.integrated else found
+        if found.range is None and not found.integrated:
+            compare_with_mesh(signal, teeth, shaft, notes)
+    else:
+        estimate = followed_comb(signal, teeth, known.speed_range)
+        if estimate.doubt:
+            notes.append(estimate.doubt)
+        if estimate.phase is None:
+            notes.append(_why_constant(signal, estimate.speed, "The mesh line is too weak to follow in phase"))
+        phase = phase_from_speed(signal, estimate.speed) if estimate.phase is None else estimate.phase
+        shaft = Shaft(phase, estimate.speed, "estimated from the mesh line", estimate)
+    remark_plausibility(signal, shaft.speed, found is None, notes)
+    if (found is None or isinstance(found, float)) and (shaft.estimate is None or shaft.estimate.phase is None):
+        notes += remark_sweep(signal, shaft.speed, teeth)
+    if shaft.phase.attrs.get("origin") == "line":
+        notes += remark_wander(signal, shaft.speed, teeth[0])
+    return shaft, signal
+
+
+def compare_with_mesh(
+    signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, notes: list[str]
+) -> SpeedEstimate | None:
+    """Say so where the mesh line contradicts a speed from a channel, a tacho, a curve or an angle; return the line.
+
+    Where the speed varies the signal is that over the angle, sampled as at the mean speed.
+    """
+    found = _estimate(signal, counts, (shaft.speed * (1.0 - SPEED_TOLERANCE), shaft.speed * (1.0 + SPEED_TOLERANCE)))
+    hint = " Or the tacho has another number of pulses a turn (pulses_per_rev=, --pulses)." if shaft.tacho else None
+    if _remark_other(signal, counts, shaft.speed, found, notes, hint):
+        return None
+    gmf = shaft.speed * counts[0] / math.tau
+    if _turns(signal, shaft.speed) >= FOLLOWED_TURNS and line_near(signal, gmf, SPEED_TOLERANCE) is None:
+        notes.append(_nothing_near(counts[0], shaft.speed, False) + f" It is used as it is, {shaft.origin}.")
+        return None
+    if found is None or found.phase is None or _turns_beside(found, counts[0], shaft.speed):
+        return None
+    if not shaft.integrated:
+        told = f"{shaft.speed * 30 / math.pi:.2f} rpm {shaft.origin}"
+        notes += _remark_off(found, shaft.speed, gmf, told, shaft.range is not None)
+    return found
+
+
+def _calibrated(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, notes: list[str]) -> Shaft:
+    """Return the angle of a speed over time, calibrated by the mesh line: it adds up what the speed is off.
+
+    Where the speed varies by more than a line can be followed by, the line is looked for in angle.
+    """
+    phase, teeth = shaft.phase, counts[0]
+    steady = strays(phase, shaft.speed) < FOLLOWED / teeth
+    over = signal if steady else _over_angle(signal, shaft, teeth)
+    found = compare_with_mesh(over, counts, shaft, notes)
+    if found is None or found.phase is None:
+        return shaft
+    times = found.phase["time"].values[[0, -1]]
+    told = shaft.speed * float(times[1] - times[0])
+    if steady:
+        told = float(np.diff(np.interp(times, phase["time"].values, phase.values))[0])
+    off = float(found.phase.values[-1] - found.phase.values[0]) / told - 1.0
+    lines = abs(off) * shaft.speed * teeth / math.tau / found.resolution
+    if lines < LEAST_OFF:
+        return shaft
+    check = "CHECK THE SPEED: " if lines > LINES_OFF else ""
+    notes.append(
+        f"{check}By the mesh line the speed {shaft.origin} is {-100.0 * off:+.3f} % off, on average: it is calibrated "
+        "by this line, which orders and averages would have lost."
+    )
+    low_high = None if shaft.range is None else (shaft.range[0] * (1.0 + off), shaft.range[1] * (1.0 + off))
+    same = (phase * (1.0 + off)).assign_attrs(phase.attrs)
+    return shaft._replace(phase=same, speed=shaft.speed * (1.0 + off), range=low_high)
+
+
+def _over_angle(signal: xr.DataArray, shaft: Shaft, teeth: int) -> xr.DataArray:
+    """Return a record over the angle, as if the shaft turned at its mean speed."""
+    per_rev = 1 << math.ceil(math.log2(2.5 * teeth * (HARMONICS + 1)))
+    angular = angular_resample(signal, shaft.phase, samples_per_rev=per_rev)
+    names = [str(c) for c in angular["channel"].values]
+    return make_signal(angular.values, per_rev * shaft.speed / math.tau, channels=names, units=units_of(signal))
+
+
+def _remark_off(found: SpeedEstimate, speed: float, gmf: float, told: str, varying: bool) -> list[str]:
+    """Say so where the mesh line is off the speed (rad/s) by which angles are taken."""
+    off, rpm = found.speed / speed - 1.0, found.speed * 30 / math.pi
+    if abs(off) * gmf <= LINES_OFF * found.resolution:
+        return []
+    mean, alone = ("on average ", "") if varying else ("", f", or give speed='{rpm:.2f} rpm' alone")
+    return [
+        f"CHECK THE SPEED: the mesh line is {mean}at {rpm:.2f} rpm, {100 * off:+.2f} % off the {told}, by which orders "
+        f"and averages are taken. Calibrate it{alone}."
+    ]
+
+
+def _near_speed(signal: xr.DataArray, counts: tuple[int, ...], nominal: float, notes: list[str]) -> Shaft:
+    """Return the angle by the mesh line near a given speed, or at that speed where none stands out, which is told."""
+    around = (nominal * (1.0 - SPEED_TOLERANCE), nominal * (1.0 + SPEED_TOLERANCE))
+    found = _estimate(signal, counts, around)
+    if found is not None and (beside := _turns_beside(found, counts[0], nominal)):
+        found = _not_a_sideband(signal, counts, nominal, found, beside, notes)
+    doubted = _remark_other(signal, counts, nominal, found, notes)
+    sure = found is not None and not doubted
+    gmf = nominal * counts[0] / math.tau
+    line = gmf if sure else line_near(signal, gmf, SPEED_TOLERANCE)
+    if line is None and _turns(signal, nominal) >= FOLLOWED_TURNS:
+        notes.append(_nothing_near(counts[0], nominal, doubted) + " It is taken as constant.")
+        return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
+    if found is not None and found.phase is not None:
+        words = f"from the mesh line, {100 * (found.speed / nominal - 1):+.3f} % off the given speed"
+        return Shaft(found.phase, found.speed, words, found)
+    phase = None
+    if line is not None:
+        with suppress(SignalError):
+            phase = phase_from_line(signal, line, counts[0])
+    if phase is not None and phase.attrs["quality"] >= MIN_QUALITY:
+        followed = float(phase.attrs["mean_speed"])
+        if abs(followed / nominal - 1) < SPEED_TOLERANCE:
+            return Shaft(phase, followed, "from the given speed, followed by the mesh line")
+    notes.append(_why_constant(signal, nominal, "No mesh line could be followed near the given speed"))
+    if found is not None and not doubted and _turns(signal, nominal) < FOLLOWED_TURNS:
+        line, turn = line_near(signal, gmf, SPEED_TOLERANCE), nominal / math.tau
+        # whole turns from the mesh stand its sidebands, of planetary sets higher than itself
+        sideband = abs((found.gmf - gmf + 0.5 * turn) % turn - 0.5 * turn) <= found.resolution
+        if line is not None and abs(line - found.gmf) <= found.resolution and not sideband:
+            notes += _remark_off(found, nominal, gmf, f"{nominal * 30 / math.pi:.2f} rpm given", False)
+    return Shaft(phase_from_speed(signal, nominal), nominal, "as given")
+
+
+def _turns_beside(found: SpeedEstimate, count: int, nominal: float) -> float:
+    """Return by how many turns of the shaft a line is beside the mesh frequency of the given speed; 0 below a half."""
+    turns = (found.gmf - nominal * count / math.tau) / (nominal / math.tau)
+    return turns if abs(turns) > SIDEBAND_TURNS else 0.0
+
+
+def _not_a_sideband(
+    signal: xr.DataArray,
+    counts: tuple[int, ...],
+    nominal: float,
+    found: SpeedEstimate,
+    beside: float,
+    notes: list[str],
+) -> SpeedEstimate | None:
+    """Return the line by which the speed is taken, where the highest stands turns of the shaft beside the expected one.
+
+    Whole turns beside the mesh frequency stand its sidebands, of planetary sets higher than itself, if it is there at
+    all: a line exactly there confirms the given speed more than it speaks against it. Elsewhere it may be either.
+    """
+    whole = round(beside)
+    told = f"{nominal * 30 / math.pi:.2f} rpm"
+    exact = abs(beside - whole) * nominal / math.tau <= LINES_OFF * found.resolution
+    miscounted = abs(whole) <= MISCOUNTED
+    kind = f"{abs(beside):.3g} turns of the shaft {'above' if beside > 0 else 'below'} that of the given {told}"
+    if not exact:
+        notes.append(
+            f"The highest line near the mesh frequency is {kind}, and the speed is taken by it. If it "
+            "is a sideband, as planetary sets have, pass planetary= or a tacho."
+        )
+        return found
+    notes.append(
+        f"The highest line near the mesh frequency is {kind}: a sideband, as planetary sets have (planetary=). The "
+        f"given speed is kept; if {found.speed * 30 / math.pi:.2f} rpm is right, give that"
+        + (f"; if the wheel has {counts[0] + whole} teeth, not {counts[0]}, it is the mesh." if miscounted else ".")
+    )
+    half = SIDEBAND_TURNS / counts[0]
+    return _estimate(signal, counts, (nominal * (1.0 - half), nominal * (1.0 + half)))
+
+
+def _nothing_near(count: int, nominal: float, doubted: bool) -> str:
+    """Say that the record does not confirm a speed, and ask for it unless it was `doubted` before."""
+    return (
+        f"{'No' if doubted else 'CHECK THE SPEED: no'} mesh line was found within {100 * SPEED_TOLERANCE:g} % "
+        f"of the given speed ({nominal * 30 / math.pi:.1f} rpm, {nominal * count / math.tau:.2f} Hz with {count} teeth)"
+        ", none that stands out from the noise and other lines. Is it the speed of the wheel with these teeth, in its "
+        "right unit?"
+    )
+
+
+def _turns(signal: xr.DataArray, speed: float) -> float:
+    return signal.sizes["time"] / rate_of(signal) * speed / math.tau
+
+
+def _why_constant(signal: xr.DataArray, speed: float, otherwise: str) -> str:
+    """Say why the speed is taken as constant: short records have nothing to follow it by, whatever their lines."""
+    turns = _turns(signal, speed)
+    if turns < FOLLOWED_TURNS:
+        return (
+            f"The speed is taken as constant: a record of {turns:.3g} revolutions is too short to follow the mesh line "
+            f"in phase, which takes {FOLLOWED_TURNS:g}."
+        )
+    return f"{otherwise}; the speed is taken as constant."
+
+
+def _estimate(
+    signal: xr.DataArray, counts: tuple[int, ...], around: tuple[float, float] | None
+) -> SpeedEstimate | None:
+    try:
+        return followed_comb(signal, counts, around)
+    except SignalError:
+        return None
+
+
+def _remark_other(
+    signal: xr.DataArray,
+    counts: tuple[int, ...],
+    nominal: float,
+    found: SpeedEstimate | None,
+    notes: list[str],
+    hint: str | None = None,
+) -> bool:
+    """Say so where the record, left to itself, shows another mesh frequency more clearly than near the given speed.
+
+    Returns
+    -------
+    bool
+        Whether the given speed is in doubt.
+    """
+    try:
+        blind = find_comb(signal, counts, speed_range=None)
+    except SignalError:
+        return False
+    # a sideband within the tolerance may have been taken for a mesh line that lies just beyond it
+    apart = nominal if found is None else found.speed
+    if abs(blind.speed / apart - 1.0) < (OTHER_COMB if found is None else SAME_COMB):
+        return False
+    ratio = blind.speed / nominal
+    here = "no mesh line" if found is None else f"only a comb of {found.score:.0f} dB"
+    if found is not None and blind.score >= found.score + STRONGER_DB and not _related(blind, found):
+        notes.append(
+            f"Near the given speed there is a mesh line at {found.gmf:.2f} Hz ({found.score:.0f} dB), but one of "
+            f"{blind.score:.0f} dB at {blind.gmf:.2f} Hz is stronger: another stage of the gearbox, or, with "
+            f"{counts[0]} teeth, {blind.speed * 30 / math.pi:.1f} rpm."
+        )
+        return False
+    if found is not None and blind.score < found.score + STRONGER_DB:
+        # half the speed has every line of the whole one among its own, and nearly its score
+        whole = round(ratio)
+        if (
+            whole < 2
+            or abs(ratio / whole - 1.0) > SPEED_TOLERANCE
+            or not own_lines_missing(signal, found.gmf, blind.gmf)
+        ):
+            return False
+        here = "hardly a line at the mesh frequency itself"
+    notes.append(
+        f"CHECK THE SPEED: near the given {nominal * 30 / math.pi:.1f} rpm there is {here}, but the record shows one "
+        f"of {blind.score:.0f} dB at {blind.gmf:.2f} Hz, which with {counts[0]} teeth is "
+        f"{blind.speed * 30 / math.pi:.1f} rpm ({ratio:.3f} times the given speed)."
+        f"{other_teeth(ratio, counts[0])}{other_rate(signal, ratio) if hint is None else hint}"
+    )
+    return True
+
+
+def _related(blind: Comb, found: SpeedEstimate) -> bool:
+    """Whether the lines of a comb may be harmonics, part orders or sidebands of another one's mesh line.
+
+    Combs at two to three, say, share every other line, which makes a comb where there is none.
+    """
+    ratio = max(blind.gmf / found.gmf, found.gmf / blind.gmf)
+    if any(abs(k * ratio / round(k * ratio) - 1.0) < SPEED_TOLERANCE for k in range(1, SHARED_HARMONIC + 1)):
+        return True
+    apart = abs(blind.gmf - found.gmf)
+    turns = (blind.speed / math.tau, found.speed / math.tau)
+    return any(abs(apart - k * shaft) < SPEED_TOLERANCE * shaft * k for shaft in turns for k in range(1, SIDEBANDS + 1))
