@@ -22,7 +22,8 @@ from gearmbs.signals import (
     to_signal,
     write_signal,
 )
-from gearmbs.signals.rotation.shaft import Known, mesh_shaft
+from gearmbs.signals.rotation.mesh_shaft import mesh_shaft
+from gearmbs.signals.rotation.shaft import Known
 from tests.says import says
 from tests.signals.test_measured_lines import LEVELS
 

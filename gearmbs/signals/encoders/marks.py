@@ -138,7 +138,8 @@ def torsional_vibration(train: PulseTrain, marks: Any = None) -> xr.DataArray:
         rad, dimensions (angle, channel), angle in turns from mark 0, `lines` samples a turn: what
         `gearmbs.signals.order_spectrum` takes. The speed over time is `instantaneous_speed` of `angle_of_pulses`.
     """
-    found = _own(train, None if marks is None else errors_of(marks, train), slow_angle(train))
+    errors = None if marks is None else errors_of(marks, train)
+    found = _own(train, errors, slow_angle(train, errors))
     return xr.DataArray(
         found.values[:, None],
         dims=("angle", "channel"),

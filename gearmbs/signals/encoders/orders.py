@@ -176,12 +176,21 @@ def common_angle(train: PulseTrain, errors: np.ndarray | None = None) -> Course:
     return course
 
 
-def slow_angle(train: PulseTrain) -> Course:
-    """Return the angle of a shaft without what swings of it a few times a turn or once in a few: cubic splines."""
-    numbers, times, _ = train.every()
+def slow_angle(train: PulseTrain, errors: np.ndarray | None = None) -> Course:
+    """Return the angle of a shaft without what swings of it a few times a turn or once in a few: cubic splines.
+
+    Parameters
+    ----------
+    train : PulseTrain
+    errors : ndarray of shape (lines,), optional
+        Of its marks, rad; those of a few marks would bend the splines.
+    """
+    numbers, times = train.numbers, train.times
     parts = max(FEWEST_PIECES, math.floor(train.turns / KNOTS))
     knots = np.interp(np.linspace(numbers[0], numbers[-1], parts + 1)[1:-1], numbers, times)
     angle = TURN / train.lines * numbers
+    if errors is not None:
+        angle = angle + errors[numbers % train.lines]
     # about the mean, so that no digits are lost
     middle, straight = 0.5 * (times[0] + times[-1]), train.mean_speed
     at = times - middle

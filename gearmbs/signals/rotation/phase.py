@@ -16,6 +16,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
+from gearmbs.signals.rotation.uneven_marks import uneven_faults
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.given import speed_curve
 from gearmbs.signals.signal.signal import rate_of
@@ -377,7 +378,8 @@ def pulse_faults(edges: np.ndarray, pulses_per_rev: float) -> list[PulseFault]:
     Intervals that differ from the median around them are compared with the straight line through the logarithms of up
     to three intervals on each side, which follows a run-up. Together they should take as many of those as there are of
     them; if it is another whole number, clearly beyond how the neighbours themselves scatter, pulses are missing or too
-    many. What recurs with the wheel's revolution is its own pitch.
+    many. What recurs with the wheel's revolution is its own pitch; of a wheel with uneven marks intervals are compared
+    with those a turn away (`gearmbs.signals.rotation.uneven_marks`).
 
     Parameters
     ----------
@@ -393,6 +395,10 @@ def pulse_faults(edges: np.ndarray, pulses_per_rev: float) -> list[PulseFault]:
     intervals = np.diff(edges)
     if intervals.size < FEWEST_BESIDE + 1:
         return []
+    if pulses_per_rev == round(pulses_per_rev):
+        uneven = uneven_faults(edges, int(pulses_per_rev))
+        if uneven is not None:
+            return [PulseFault(*place) for place in uneven]
     logs = np.log(np.maximum(intervals, 1e-300))
     deviation = logs - _median(logs, MEDIAN_REACH)
     odd = np.abs(deviation) > UNLIKE
