@@ -127,6 +127,12 @@ def convert(
     return result.assign_attrs(notes=[*signal.attrs.get("notes", ()), *told]) if told else result
 
 
+def rms_within(column: np.ndarray, rate: float, band: tuple[float, float]) -> float:
+    """Return the RMS of what a column has in a band, with the window of `convert` at its ends."""
+    low, high = band[0], min(band[1], 0.5 * rate)
+    return float(np.std(_multiply(column - column.mean(), rate, 0, low, high, 0)))
+
+
 def _share_below(column: np.ndarray, rate: float, low: float) -> float:
     """Return the part of the RMS of a column without its mean that lies below a frequency."""
     from scipy.fft import next_fast_len, rfft

@@ -50,6 +50,25 @@ def test_a_model_that_is_the_experiment_times_a_factor_agrees_perfectly():
     )
 
 
+@pytest.mark.parametrize("high", [1500.0, 2400.0, 6000.0])
+def test_a_model_is_scaled_by_what_it_has_in_the_band_of_the_experiment(high):
+    """The experiment is the model's own acceleration, as a displacement: the factor is 1, whatever lies beyond."""
+    t = np.arange(round(2.0 * RATE)) / RATE
+    heights = {"healthy": (1.0, 0.5, 0.25, 0.4, 0.3, 0.9), "misaligned": (1.1, 1.5, 0.3, 0.4, 0.3, 0.9)}
+    lines = {s: enumerate(h, 1) for s, h in heights.items()}
+    model, place = {}, {}
+    for state, each in lines.items():
+        parts = [(a, 2 * np.pi * k * GMF) for k, a in each]
+        known = {"units": "m/s^2", "speed": OMEGA, "teeth": TEETH}
+        model[state] = make_signal({"a": sum(a * np.cos(w * t) for a, w in parts)}, RATE, **known)
+        moved = {"y": sum(-a / w**2 * np.cos(w * t) for a, w in parts)}
+        place[state] = make_signal(moved, RATE, **{**known, "units": "m"})
+    harmonics = min(3, int(high / GMF))
+    report = compare(place, model, quantity="acceleration", band=(100.0, high), harmonics=harmonics)
+    assert float(report.data["factor"].sel(state="healthy").item()) == pytest.approx(1.0, rel=2e-3)
+    np.testing.assert_allclose(report.data["model"], report.data["experiment"], rtol=5e-3)
+
+
 @pytest.mark.slow
 def test_scaling_scopes():
     model = {

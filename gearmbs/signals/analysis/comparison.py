@@ -15,11 +15,11 @@ from gearmbs.signals.analysis.analysis import analyse
 from gearmbs.signals.analysis.bands import HALF_WIDTH
 from gearmbs.signals.analysis.comparison_report import ComparisonReport
 from gearmbs.signals.analysis.report import LOUD, AnalysisReport
-from gearmbs.signals.conversion import Dimension, convert
+from gearmbs.signals.conversion import Dimension, convert, rms_within
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.optical import instrument_faults, turn_floor
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
-from gearmbs.signals.signal.signal import like, require
+from gearmbs.signals.signal.signal import like, rate_of, require
 from gearmbs.units import to_si
 
 Progress = Callable[[float, str], None]
@@ -70,7 +70,7 @@ def compare(
     """Compare the gear mesh harmonics of states and loads, measured and simulated.
 
     For every load and state the RMS of the first GMF harmonics is taken (`analyse`). The model's are multiplied by
-    the ratio of the mean-free RMS, experiment over model, of the whole records.
+    the ratio of the mean-free RMS, experiment over model, of the whole records, or of what both have in ``band``.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def compare(
     quantity : {"displacement", "velocity", "acceleration"}, optional
         To convert the experiment to (`convert`), as the paper did with the velocity of its laser.
     band : (float or str, float or str), optional
-        For it, Hz: outside nothing is left.
+        For it, Hz: outside nothing is left. The model's RMS for the factor is that within it.
     progress : callable, optional
         Called as progress(fraction, stage); without it a bar is shown where somebody watches, see `gearmbs.progress`.
 
@@ -149,6 +149,8 @@ def compare(
         for load, state in kept:
             signal = _picked(cases[load][state], pick, side, single=model is not None)
             report, found[side][load, state] = _features(signal, harmonics, half_width, way, wheel, tell)
+            if side == "model" and band is not None:
+                found[side][load, state]["level"] = _level_within(signal, band)
             done += 1
             if side == "experiment":
                 own = signal.attrs.get("notes", ()) if quantity is not None else ()
@@ -210,6 +212,12 @@ def _converted(
         load: {state: convert(signal, quantity, band=(low, high)) for state, signal in states.items()}
         for load, states in experiment.items()
     }
+
+
+def _level_within(signal: xr.DataArray, band: tuple[Any, Any]) -> tuple[str, np.ndarray]:
+    """Return the RMS of each channel within a band, beyond which the experiment has nothing either."""
+    low, high = (to_si(edge, "frequency", "band") for edge in band)
+    return "channel", np.array([rms_within(column, rate_of(signal), (low, high)) for column in signal.values.T])
 
 
 def _remarked(signal: xr.DataArray) -> xr.DataArray:

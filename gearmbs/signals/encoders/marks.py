@@ -20,6 +20,8 @@ SIDEBANDS = 2
 """Shaft orders beside a mesh order that are left out: modulation by the shaft is there."""
 FEWEST_ORDERS = 8
 """Orders from which the scatter of a regression is known to a quarter of itself."""
+QUARTERS = 4
+"""Turns of which a record of torsional vibration is a multiple: half and quarter orders are lines of its spectrum."""
 NEIGHBOURS = 33
 """Orders whose median is the level that a line stands in: as many as `transmission.LEVEL_LINES` and its own."""
 
@@ -136,15 +138,30 @@ def torsional_vibration(train: PulseTrain, marks: Any = None) -> xr.DataArray:
     -------
     xarray.DataArray
         rad, dimensions (angle, channel), angle in turns from mark 0, `lines` samples a turn: what
-        `gearmbs.signals.order_spectrum` takes. The speed over time is `instantaneous_speed` of `angle_of_pulses`.
+        `gearmbs.signals.order_spectrum` takes, over a multiple of four turns, so that quarters of orders are lines of
+        it. Attributes: ``highest_order``, and ``notes`` with what the train and the number of lines leave open. The
+        speed over time is `instantaneous_speed` of `angle_of_pulses`.
     """
     errors = None if marks is None else errors_of(marks, train)
     found = _own(train, errors, slow_angle(train, errors))
+    whole = train.lines * (QUARTERS if train.turns >= 2 * QUARTERS + 1 else 1)
+    count = found.numbers.size - found.numbers.size % whole
+    top = 0.5 * train.lines
+    folded_down = (
+        f"{train.name}: {train.lines} lines show orders below {top:g}; what the shaft has from there on is folded "
+        f"down, as order {train.lines - 1} onto 1, and nothing tells it from orders below."
+    )
     return xr.DataArray(
-        found.values[:, None],
+        found.values[:count, None],
         dims=("angle", "channel"),
-        coords={"angle": found.numbers / train.lines, "channel": [train.name], "units": ("channel", ["rad"])},
-        attrs={"samples_per_rev": train.lines, "units": "rad", "mean_speed": train.mean_speed},
+        coords={"angle": found.numbers[:count] / train.lines, "channel": [train.name], "units": ("channel", ["rad"])},
+        attrs={
+            "samples_per_rev": train.lines,
+            "units": "rad",
+            "mean_speed": train.mean_speed,
+            "highest_order": top,
+            "notes": [*train.notes, folded_down],
+        },
     )
 
 

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gearmbs.signals import SignalError, pulse_train, pulses_of_channel, to_signal, torsional_vibration
+from gearmbs.signals import (
+    SignalError,
+    order_spectrum,
+    pulse_train,
+    pulses_of_channel,
+    to_signal,
+    torsional_vibration,
+)
 from tests.says import says
 
 LINES, SPEED = 60, 60.0
@@ -66,3 +74,24 @@ def test_a_pulse_far_from_all_others_is_left_out_and_said_to_be(cut):
     # four reflectors, one quarter of a turn without any
     uneven = np.sort(np.concatenate([np.arange(20) + part for part in (0.0, 0.1, 0.2, 0.5)]))
     assert pulse_train(uneven, 4, faults="keep").times.size == pulse_train(uneven, 4).times.size
+
+
+@pytest.mark.parametrize("turns", [63, 64, 65, 66])
+@pytest.mark.parametrize("order", [0.25, 0.5, 1.5, 7.0])
+def test_half_and_quarter_orders_are_lines_of_the_spectrum(order, turns):
+    """Between two lines of a Hann window 15 % of the height are missing."""
+    found = order_spectrum(torsional_vibration(train(order, turns)))
+    assert float(found["order"].sel(order=order, method="nearest")) == pytest.approx(order, abs=1e-9)
+    assert float(found.sel(order=order, method="nearest")[0]) == pytest.approx(1e-3, rel=0.03 if order < 1.0 else 0.005)
+
+
+def test_what_marks_cannot_show_is_in_the_attributes():
+    """Order 40 of 60 marks is folded onto 20."""
+    found = torsional_vibration(train(40.0))
+    lines = order_spectrum(found)
+    # marks pass where the shaft is by then: 40 times a milliradian of phase
+    assert float(lines.sel(order=20.0, method="nearest")[0]) == pytest.approx(1e-3, rel=0.04)
+    assert found.attrs["highest_order"] == 30.0
+    assert any(re.search(says("60 lines", "30", "folded"), note) for note in found.attrs["notes"])
+    volts = to_signal(5.0 * ((40.0 * np.arange(40000) / 2000.0) % 1.0 < 0.5), rate=2000.0, units="V")
+    assert any("half a sample" in note for note in torsional_vibration(pulses_of_channel(volts, 60)).attrs["notes"])
