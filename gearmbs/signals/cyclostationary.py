@@ -44,7 +44,9 @@ def spectral_correlation(
     highest : float or str
         Highest cyclic frequency, Hz: a few times the rate of blows.
     segment : int
-        Samples of a block; the resolution over f is the rate by this, that over alpha one by the record's length.
+        Samples of a block; the resolution over f is the rate by this, that over alpha one by the record's length: a
+        line midway between two cyclic frequencies has 64 % of its height there, so that heights are to be read of
+        records cut to whole periods.
     channel : str, optional
         Default: the first.
 

@@ -23,7 +23,7 @@ FEWEST_ORDERS = 8
 QUARTERS = 4
 """Turns of which a record of torsional vibration is a multiple: half and quarter orders are lines of its spectrum."""
 NEIGHBOURS = 33
-"""Orders whose median is the level that a line stands in: as many as `transmission.LEVEL_LINES` and its own."""
+"""Orders whose median is the level that a line stands in: as many as `levels.LEVEL_LINES` and its own."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,11 +14,13 @@ from scipy import stats
 
 from gearmbs._display import Shown
 from gearmbs.signals.analysis.report import markdown_table
+from gearmbs.signals.encoders.cycle import fall, missing_beyond, noise_within
 from gearmbs.signals.encoders.estimate import Found, amplitude_interval
 from gearmbs.signals.encoders.lengths import ACCURACY
 from gearmbs.signals.encoders.orders import Gearing, beside
 from gearmbs.signals.encoders.pulses import TURN
 from gearmbs.signals.errors import SignalError
+from gearmbs.units import Quantity, to_si
 
 MESH_POINTS = 64
 """Points of a mesh cycle in curves."""
@@ -284,20 +286,79 @@ class MeasuredTransmissionError(Shown):
         values, turns, _ = self._closed(self._load(load), None if shaft is None else _shaft(shaft))
         return turns * np.arange(values.size) / values.size, values
 
-    def mesh_cycle(self, load: str | None = None, points: int = 400) -> tuple[np.ndarray, np.ndarray]:
+    def mesh_cycle(
+        self, load: str | None = None, points: int = 400, harmonics: int | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Error over one mesh cycle from its harmonics: phase, 0 up to 1 from mark 0 of the driver, and error, m.
 
         Where a turn of the driver has no whole number of meshes, from mark 0 in the first of its turns.
+
+        Parameters
+        ----------
+        load : str, optional
+            Default: the first.
+        points : int
+        harmonics : int, optional
+            The highest that is taken; `curve_accuracy` says what more or fewer of them do. Default: all.
         """
         phase, load = np.arange(points) / points, self._load(load)
         error = np.zeros(points)
         for one in self.lines:
-            if one.harmonic:
+            if one.harmonic and (harmonics is None or one.harmonic <= harmonics):
                 value = self._value(one, load)[0]
                 if one.first is None and one.second is not None:
                     value *= np.exp(1j * one.second * self.places[load])
                 error += np.real(value * np.exp(1j * TURN * one.harmonic * phase))
         return phase, error
+
+    def curve_accuracy(self, load: str | None = None, within: Quantity | None = None) -> pd.DataFrame:
+        """How near `mesh_cycle` is to the true curve, by how many harmonics are taken.
+
+        More harmonics have more noise, fewer lack what corners of the curve are made of; longer records have less of
+        the one and allow for more of the other (`gearmbs.signals.encoders.cycle`).
+
+        Parameters
+        ----------
+        load : str, optional
+            Default: the first.
+        within : float or str, optional
+            m, to which the curve is wanted.
+
+        Returns
+        -------
+        DataFrame
+            ``harmonics``, the highest taken; ``noise`` (m), below which their noise stays all over the cycle with the
+            result's probability; ``missing`` (m), what those that are not taken add up to at a corner at most; and
+            ``within``, the sum of both. With `within`, the ``seconds`` in mesh (and as many times as long free)
+            by which the sum is as small; infinite where harmonics are missing or marks unknown.
+
+        Raises
+        ------
+        SignalError
+            If the result has no mesh harmonics.
+        """
+        load = self._load(load)
+        wanted = None if within is None else to_si(within, "length", "within")
+        mesh = [one for one in self.lines if one.harmonic]
+        if not mesh:
+            raise SignalError("harmonics: none are seen, so that there is no curve over a mesh cycle")
+        numbers = np.array([one.harmonic for one in mesh])
+        found = [self._value(one, load) for one in mesh]
+        sizes, variances = np.abs([value for value, _ in found]), np.array([v for _, v in found])
+        a = fall(numbers, sizes, variances)
+        unseen = np.setdiff1d(np.arange(1, numbers.max() + 1), numbers)
+        sure = all(one.calibrated for one in mesh)
+        rows = []
+        for count in range(1, numbers.size + 1):
+            noise = noise_within(numbers[:count], variances[:count], self.probability)
+            missing = missing_beyond(a, int(numbers[count - 1]), unseen)
+            row = {"harmonics": int(numbers[count - 1]), "noise": noise, "missing": missing, "within": noise + missing}
+            if wanted is not None:
+                left = wanted - missing
+                far = left <= 0.0 or (noise > left and not sure)
+                row["seconds"] = math.inf if far else self.recorded[load] * max(1.0, (noise / left) ** 2)
+            rows.append(row)
+        return pd.DataFrame(rows)
 
     def single_flank(self, load: str | None = None) -> pd.DataFrame:
         """The values of single-flank testing, m: of the pair, and of what recurs with each shaft.

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from gearmbs.progress import waiting
 from gearmbs.signals.encoders.estimate import Found, Row, estimate
 from gearmbs.signals.encoders.lengths import ACCURACY
+from gearmbs.signals.encoders.levels import Levels
 from gearmbs.signals.encoders.marks import encoder_marks, share_found
 from gearmbs.signals.encoders.meetings import averaged, lines_by_meetings
 from gearmbs.signals.encoders.orders import (
@@ -25,7 +27,6 @@ from gearmbs.signals.encoders.orders import (
     bridged,
     common_angle,
     deviations,
-    folded,
     smooth_angle,
 )
 from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks, stray_lines
@@ -45,8 +46,6 @@ from gearmbs.signals.rotation.phase import MOST_MISSING
 from gearmbs.signals.signal.signal import check_teeth
 from gearmbs.units import Quantity, to_si
 
-LEVEL_LINES = 32
-"""Orders beside one, at most, by whose median the level of the marks is told."""
 SLIPPED = 0.05
 """Pitches by which wheels and discs of two runs may stand otherwise than told: 1/20 is 18 degrees of the mesh."""
 LARGEST_RADIUS = 10.0
@@ -90,7 +89,7 @@ class _Measured:
     window: Window
     stray: list[tuple[float, float]]
 
-    @property
+    @cached_property
     def wander(self) -> float:
         """RMS of the lag in the mesh, rad of the second shaft at most."""
         return math.sqrt(0.5 * sum(abs(self.values[o].value) ** 2 for o in self.mesh)) / self.ratio
@@ -188,7 +187,7 @@ def transmission_error_from_pulses(
         name: [_free_lines(train, name, _whole(orders, k), errors[name]) for train in freed[name]]
         for k, name in enumerate(freed)
     }
-    levels = _Levels(gearing, orders, measured, trains, mark_error, {n for n in marks if marks[n]})
+    levels = Levels(gearing, orders, [m.values for m in measured], trains, mark_error, marks)
     shadows = _shadows(gearing, orders, measured, trains)
     found = []
     for order in orders:
@@ -529,69 +528,3 @@ AROUND = 2
 def _whole(orders: Iterable[Order], shaft: int) -> list[int]:
     """Return the whole orders of a shaft."""
     return [o for order in orders if (o := order.second if shaft else order.first) is not None]
-
-
-class _Levels:
-    """Variances of the marks' lines: as told, or by the orders of each shaft beside the mesh orders."""
-
-    def __init__(
-        self, gearing: Gearing, orders: Sequence[Order], measured: Sequence[_Measured], trains: Sequence[PulseTrain],
-        told: float | Sequence[float] | None, calibrated: set[str],
-    ) -> None:  # fmt: skip
-        self.told: dict[str, float] | None = None
-        self.gearing, self.calibrated = gearing, calibrated
-        self.orders: dict[str, np.ndarray] = {}
-        self.squares: dict[str, np.ndarray] = {}
-        scales = {"driver": 1.0, "driven": float(gearing.ratio)}
-        counted = []
-        for shaft, name in enumerate(scales):
-            own = [o for o in orders if o.harmonic is None and (o.second if shaft else o.first) is not None]
-            alone = [o for o in own if (o.first if shaft else o.second) is None]
-            shared = not alone
-            used = own if shared else alone
-            at = np.array([o.second if shaft else o.first for o in used], dtype=float)
-            square = np.array([np.mean([abs(m.values[o.order][0]) ** 2 for m in measured]) for o in used])
-            # where both discs are seen at once, each has half, unless the other is known
-            part = 0.5 if shared and not calibrated else 1.0
-            self.orders[name], self.squares[name] = at, part * square / scales[name] ** 2
-            counted.append(min(LEVEL_LINES, at.size))
-        # the median of squares has half the freedom of their mean, two for each
-        self.freedom = float(max(2, min(counted, default=2)))
-        if told is not None:
-            self.freedom = math.inf
-            shares = np.broadcast_to(np.asarray(told, dtype=float), (2,))
-            if not (np.isfinite(shares).all() and (shares >= 0.0).all()):
-                raise SignalError(f"mark_error: must be one or two shares of the pitch of the marks, got {told!r}")
-            # a line of L independent errors of variance s^2 has 2 s^2/L in each part
-            self.told = {
-                name: 2.0 * (share * TURN / train.lines) ** 2 / train.lines
-                for name, share, train in zip(scales, shares, trains)
-            }
-
-    def at(self, order: Order, name: str) -> float | None:
-        """Return the variance of a disc's line at an order; None where the order is none of the disc's."""
-        whole = order.first if name == "driver" else order.second
-        if whole is None:
-            return None
-        if self.told is not None:
-            return self.told[name]
-        return self._beside(whole, name)
-
-    def _beside(self, order: float, name: str) -> float:
-        near = np.argsort(np.abs(self.orders[name] - order), kind="stable")[:LEVEL_LINES]
-        # squares of a line of chance have the median 2 ln 2 times the variance of each part
-        return float(np.median(self.squares[name][near])) / (2.0 * math.log(2.0)) if near.size else 0.0
-
-    def folded(self, order: Order, trains: Sequence[PulseTrain]) -> float:
-        """Return the variance (rad^2 of the first shaft) of what the shafts have where an order is folded to, if it is.
-
-        With marks that are known that is their own vibration and noise, else the marks are in it already.
-        """
-        total = 0.0
-        for name, own, scale, train in (
-            ("driver", order.order, 1.0, trains[0]),
-            ("driven", self.gearing.on_second(order.order), float(self.gearing.ratio), trains[1]),
-        ):
-            if order.harmonic and own >= Fraction(train.lines, 2) and name in self.calibrated:
-                total += scale**2 * self._beside(folded(float(own), train.lines), name)
-        return total
