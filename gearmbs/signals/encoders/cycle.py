@@ -14,10 +14,10 @@ import math
 
 import numpy as np
 
-FIRST = 4
-"""Harmonic from which lines are taken to fall as those of corners: the first ones are of the curve's large shape."""
-ROUNDS = 50
-"""Of weights from the last result: far more than it takes to stand still to a hundredth."""
+POINTS = 16
+"""Half the points of a cycle for the lowest harmonic of an octave: its highest has 16 of its own."""
+CLEAR, SURE = 2.0, 0.95
+"""Heights of noise from which an octave stands clear of it: then noise is no more than half of what is seen."""
 
 
 def noise_within(numbers: np.ndarray, variances: np.ndarray, probability: float) -> float:
@@ -42,25 +42,28 @@ def noise_within(numbers: np.ndarray, variances: np.ndarray, probability: float)
     return math.sqrt(2.0 * math.log(often / (1.0 - probability)) * total)
 
 
-def fall(numbers: np.ndarray, sizes: np.ndarray, variances: np.ndarray) -> float:
-    """Return a of lines that fall as a/h^2: the mean of their powers less noise, each by how well it is known.
+def fall(numbers: np.ndarray, values: np.ndarray, variances: np.ndarray) -> float:
+    """Return a of lines that fall as a/h^2 and add up at a corner: by the highest octave that stands clear of noise.
+
+    Its harmonics n + 1 to 2 n come to a/(2 n) there.
 
     Parameters
     ----------
-    numbers, sizes, variances : ndarray of shape (n,)
-        Of the harmonics, their amplitudes, and the variances of each part.
+    numbers, values, variances : ndarray of shape (n,)
+        Of the harmonics, their complex amplitudes, and the variances of each part.
     """
-    far = numbers >= FIRST
-    h, power, v = numbers[far].astype(float), sizes[far] ** 2, np.maximum(variances[far], 1e-40)
-    if not h.size:
-        return 0.0
-    level = h**-4
-    square = float(np.max(power / level))
-    for _ in range(ROUNDS):
-        # the power of a line varies by as much as it is, as corners beat, and by its noise
-        weight = level / (square * level + 2.0 * v) ** 2
-        square = max(float(weight @ (power - 2.0 * v)) / float(weight @ level), 0.0)
-    return math.sqrt(square)
+    found, n = 0.0, 1
+    while n < numbers[-1]:
+        octave = (numbers > n) & (numbers <= 2 * n)
+        if octave.any():
+            lines = np.zeros(POINTS * n + 1, dtype=complex)
+            lines[numbers[octave]] = POINTS * n * values[octave]
+            height = float(np.abs(np.fft.irfft(lines)).max())
+            if found and height < CLEAR * noise_within(numbers[octave], variances[octave], SURE):
+                break
+            found = 2.0 * n * height
+        n *= 2
+    return found
 
 
 def missing_beyond(a: float, highest: int, unseen: np.ndarray) -> float:

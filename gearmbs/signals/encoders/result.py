@@ -344,8 +344,12 @@ class MeasuredTransmissionError(Shown):
             raise SignalError("harmonics: none are seen, so that there is no curve over a mesh cycle")
         numbers = np.array([one.harmonic for one in mesh])
         found = [self._value(one, load) for one in mesh]
-        sizes, variances = np.abs([value for value, _ in found]), np.array([v for _, v in found])
-        a = fall(numbers, sizes, variances)
+        values, variances = (np.array(part) for part in zip(*found, strict=True))
+        turned = [
+            np.exp(1j * one.second * self.places[load]) if one.first is None and one.second is not None else 1.0
+            for one in mesh
+        ]
+        a = fall(numbers, values * turned, variances)
         unseen = np.setdiff1d(np.arange(1, numbers.max() + 1), numbers)
         sure = all(one.calibrated for one in mesh)
         rows = []
