@@ -233,7 +233,8 @@ def curves() -> str:
             kept[lost] = False
             without = 1e6 * np.abs(np.fft.irfft(np.where(kept, lines, 0.0), whole.size) - whole).max()
             rows.append([
-                steady.name, f"{1e6 * np.ptp(whole):.2f}", f"{seconds:g}", f"{taken} of {count}, {len(lost)} of them not seen",
+                steady.name, f"{1e6 * np.ptp(whole):.2f}", f"{seconds:g}",
+                f"{taken} of {count}, {len(lost)} of them not seen",
                 f"{1e6 * told['noise']:.3f} + {1e6 * told['missing']:.3f}", f"{without:.3f}",
                 ", ".join(f"{value:.3f}" for value in off),
             ])  # fmt: skip

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 import scipy.linalg
@@ -26,6 +26,10 @@ from gearmbs.signals.signal.signal import like, rate_of, units_of
 from gearmbs.signals.signal.units import DIMENSIONS, unit_dimension
 from gearmbs.units import Quantity, to_si
 
+FEWEST_BLOWS, MOSTLY = 8, 0.9
+"""Spikes, and the share of them, that come at even times: of chance eight within a sample or two never do."""
+EVEN_SAMPLES, LIKE = 1.5, 0.25
+"""Samples by which their times may be uneven, and the part of their mean by which heights scatter."""
 MEMORY = 100
 """Samples from which the next is predicted: three periods of a mesh line at 30 samples each."""
 ROUNDS = 3
@@ -125,7 +129,9 @@ def repair_vibrometer(
     for name in kept:
         column = signal.values[:, names.index(name)]
         bound = None if full_scale is None else _in_unit(full_scale, units_of(signal)[names.index(name)])
-        lost, found = _lost(column, dark, bound, spikes)
+        lost, found, again = _lost(column, dark, bound, spikes)
+        if again is not None:
+            notes.append(_recurring_said(name, again, rate))
         share = float(lost.mean())
         over = float(found["over the range"].mean())
         if over > MOST_LOST:
@@ -161,8 +167,8 @@ def repair_vibrometer(
 
 def _lost(
     column: np.ndarray, dark: np.ndarray, bound: float | None, spikes: float | None
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return which samples of a channel are lost with their neighbours, and which were found by what."""
+) -> tuple[np.ndarray, dict[str, np.ndarray], _Recurring | None]:
+    """Return which samples of a channel are lost with their neighbours, which were found by what, and what recurs."""
     found = {
         "dark": dark,
         "over the range": np.zeros_like(dark) if bound is None else np.abs(column) >= AT_RANGE * bound,
@@ -181,7 +187,46 @@ def _lost(
         found["spikes"] |= more
         told |= more
         lost = _widened(told)
-    return lost, found
+    again = _recurring(column, found["spikes"], lost)
+    if again is not None:
+        found["spikes"] = np.zeros_like(dark)
+        lost = _widened(np.any(list(found.values()), axis=0))
+    return lost, found, again
+
+
+class _Recurring(NamedTuple):
+    """Spikes that recur: how many, after how many samples, and how high."""
+
+    count: int
+    period: float
+    height: float
+
+
+def _recurring(column: np.ndarray, spikes: np.ndarray, lost: np.ndarray) -> _Recurring | None:
+    """Return spikes at even times and of like heights, as blows are and light that fails by chance is not."""
+    places = _stretches(spikes)
+    if len(places) < FEWEST_BLOWS:
+        return None
+    off = column - _bridged(column, lost)
+    at = np.array([a + int(np.argmax(np.abs(off[a:b]))) for a, b in places])
+    heights = off[at]
+    period = float(np.median(np.diff(at)))
+    turn = np.round((at - at[0]) / period)
+    if turn[-1] < 1.0:
+        return None
+    period, start = np.polyfit(turn, at, 1)
+    even = np.mean(np.abs(at - start - period * turn) <= EVEN_SAMPLES) >= MOSTLY
+    often = at.size >= MOSTLY * (turn[-1] + 1.0)
+    alike = float(np.std(heights)) <= LIKE * abs(float(np.mean(heights)))
+    return _Recurring(at.size, float(period), float(np.mean(heights))) if even and often and alike else None
+
+
+def _recurring_said(name: Any, again: _Recurring, rate: float) -> str:
+    return (
+        f"{name}: {again.count} spikes recur every {again.period / rate:.6g} s with like heights, {again.height:.3g} "
+        "on average: blows do, and dark places of a turning shaft; they are left as they are. If they are the latter, a "
+        "full_scale below them (--full-scale) bridges them."
+    )
 
 
 def _told(lost: np.ndarray, found: dict[str, np.ndarray], rate: float) -> str:
@@ -213,7 +258,9 @@ def instrument_faults(signal: xr.DataArray, beside: Sequence[str] = ()) -> list[
             )
         if seen or not _known_unit(unit) or unit_dimension(unit)[0] != "velocity" or np.ptp(column) == 0.0:
             continue
-        lost, found = _lost(column, np.zeros(column.size, dtype=bool), None, SPIKE)
+        lost, found, again = _lost(column, np.zeros(column.size, dtype=bool), None, SPIKE)
+        if again is not None:
+            remarks.append(_recurring_said(name, again, rate_of(signal)))
         if lost.any():
             remarks.append(
                 f"DROP-OUTS: {name} has {_told(lost, found, rate_of(signal))}, as lasers have; all levels are wrong by "
