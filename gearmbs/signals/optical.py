@@ -197,7 +197,7 @@ def _lost(
 class _Recurring(NamedTuple):
     """Spikes that recur: how many, after how many samples, and how high."""
 
-    count: int
+    number: int
     period: float
     height: float
 
@@ -223,7 +223,7 @@ def _recurring(column: np.ndarray, spikes: np.ndarray, lost: np.ndarray) -> _Rec
 
 def _recurring_said(name: Any, again: _Recurring, rate: float) -> str:
     return (
-        f"{name}: {again.count} spikes recur every {again.period / rate:.6g} s with like heights, {again.height:.3g} "
+        f"{name}: {again.number} spikes recur every {again.period / rate:.6g} s with like heights, {again.height:.3g} "
         "on average: blows do, and dark places of a turning shaft; they are left as they are. Of the latter a "
         "full_scale below them (--full-scale) bridges them."
     )

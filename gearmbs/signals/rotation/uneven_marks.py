@@ -145,10 +145,10 @@ def _between(
         if after.first == 0:
             return []
         size = edges.size
-        turned = _Stretch(
+        mirrored = _Stretch(
             size - 1 - after.last, size - 1 - after.first, (-(after.mark + after.last - after.first)) % marks
         )
-        back = _between(-edges[::-1], turned, None, _reversed(at), marks)
+        back = _between(-edges[::-1], mirrored, None, _reversed(at), marks)
         return [Place(size - 1 - p.last, size - 1 - p.first, p.spaces, p.length) for p in reversed(back)]
     assert before is not None
     begin = before.last
