@@ -241,7 +241,7 @@ def curves() -> str:
             print(rows[-1], flush=True)
     return table(
         ["", "peak to peak, µm", "s in mesh, and free", "harmonics taken", "told: noise + missing, µm",
-         "of what they lack, µm", f"largest difference of {CURVES} records, µm"], rows
+         "of what they lack, µm", "largest difference of each record, µm"], rows
     )  # fmt: skip
 
 
