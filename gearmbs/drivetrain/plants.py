@@ -18,7 +18,8 @@ from gearmbs.gears.mesh import FlankFriction
 from gearmbs.mechanism.parts.functions import as_function, constant
 from gearmbs.mechanism.parts.inputs import Input
 from gearmbs.mechanism.solve.analyses import static_equilibrium
-from gearmbs.mechanism.solve.plant_names import Given, Told, count_from_here, own_marker
+from gearmbs.mechanism.solve.carriers import count_from_here, own_marker
+from gearmbs.mechanism.solve.plant_names import Given, Told
 from gearmbs.mechanism.solve.plants import linearize as linear_plant
 from gearmbs.mechanism.solve.points import point_of
 from gearmbs.wording import did_you_mean

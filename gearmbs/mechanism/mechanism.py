@@ -307,7 +307,8 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
             Usually a :class:`gearmbs.gears.GearPair`.
         carrier : Body, optional
             What carries the axes of the wheels, from which the turns of a transmission error count, as those of planets
-            do from their carrier; default: the ground. Forces do not depend on it.
+            do from their carrier; default: the ground, and where a wheel stands on what turns about another axis a
+            transmission error is refused until it is named. Forces do not depend on it.
 
         Raises
         ------

@@ -48,6 +48,14 @@ class Measured:
         """
         return self._measures().deflection(marker)
 
+    def transmission_error(self, mesh: object) -> np.ndarray:
+        """Return r_b1 phi_1 + s r_b2 phi_2 of a gear contact, shape (m,), m; by contact or name.
+
+        s is 1 for external and -1 for internal pairs; angles about the wheels' own axes, up to a base pitch. Where
+        wheel 1 drives and turns positively about its axis it is positive if the other lags, else negative.
+        """
+        return self._measures().transmission_error(mesh)
+
     def state(self, state: object) -> np.ndarray:
         """Return a user-defined state of the mechanism, shape (m,); by state or name."""
         return self._measures().state(state)

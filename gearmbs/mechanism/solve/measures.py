@@ -21,20 +21,17 @@ from gearmbs.dae.results.frames import (
     rows_of_jumps,
     warn_of_doubtful_turns,
 )
-from gearmbs.mechanism.parts.bodies import Body, Marker, markers_kept
+from gearmbs.mechanism.parts.bodies import Body, Marker, cross, markers_kept
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism.solve.carriers import CARRIED, carrier_of, how_to_name, levers, pair_of
 from gearmbs.units import shown
 
 if TYPE_CHECKING:
     from gearmbs.dae.results.solution import Solution
     from gearmbs.mechanism.mechanism import Mechanism
-
-
-CARRIED = 0.1
-"""Turn of a line of centres, rad, that no bearing allows: a tenth of the centre distance."""
 
 
 class Measures:
@@ -47,6 +44,8 @@ class Measures:
         if list(mechanism.bodies) != solution.system.body_names:
             raise ModelError(f"mechanism '{mechanism.name}': its bodies are no longer those of the solution")
         self.mechanism, self.solution = mechanism, solution
+        self.looked_at: set[str] = set()
+        """Meshes whose wheels stay where they are, by what they stand on."""
 
     # --- joints -------------------------------------------------------------------------------------
 
@@ -173,16 +172,17 @@ class Measures:
         carries from that body (`Mechanism.gear_contact`). They are known up to full turns, so up to base pitches: what
         is told is nearest to zero.
         """
-        from gearmbs.mechanism.solve.plant_names import carrier_of, levers, pair_of
-
         name = getattr(mesh, "name", mesh)
         meshes = {n: e for n, e in self.mechanism.elements.items() if pair_of(e) is not None}
         if name not in meshes:
             raise KeyError(f"mesh {name!r}; the gear contacts are {', '.join(meshes) or 'none'}")
         element, total = meshes[name], np.zeros(self.solution.t.size)
         *both, pitch = levers(element)
-        carrier = carrier_of(self.mechanism, element)
+        carrier = self.mechanism.ground
+        if name in self.mechanism.carriers or name not in self.looked_at:
+            carrier = carrier_of(self.mechanism, element)
         if carrier.is_ground:
+            self.looked_at.add(name)
             self._check_axes(element)
         for marker, lever in zip((element.i, element.j), both, strict=True):
             first, now = marker.global_orientation(), self._axes(marker)[:, :, 0]
@@ -202,11 +202,12 @@ class Measures:
         axis = element.i.global_orientation()[:, 2]
         first = element.j.global_position() - element.i.global_position()
         now = self._motion(element.j)[:, KIN_R : KIN_R + 3] - self._motion(element.i)[:, KIN_R : KIN_R + 3]
-        turned = np.arctan2(np.cross(first, now) @ axis, now @ first - (now @ axis) * (first @ axis))
-        if (largest := float(np.abs(turned).max(initial=0.0))) > CARRIED:
+        along = first - (first @ axis) * axis
+        turned = np.abs(np.arctan2(now @ cross(axis, along), now @ along))
+        if (largest := float(turned.max(initial=0.0))) > CARRIED:
             raise ModelError(
-                f"gear contact '{element.name}': the line of centres of its wheels has turned by {largest:.3g} rad, as "
-                "of a planet; name what carries them, gear_contact(..., carrier=body), from which their turns count"
+                f"gear contact '{element.name}': the line of centres of its wheels has turned by {largest:.3g} rad, "
+                f"something carries it; {how_to_name(element.name)}"
             )
 
     def output(self, name: str) -> Any:
@@ -214,7 +215,7 @@ class Measures:
         made = self.named_output(name)
         with markers_kept((self.mechanism.ground, *self.mechanism.bodies.values())):
             what, *names = made.asked
-            found = getattr(self if what == "transmission_error" else self.solution, what, None)
+            found = getattr(self.solution, what, None)
             if found is None:
                 raise ModelError(f"output {name!r}: a solution tells of no {what!r}; see the methods of Solution")
             return made.of(found(*names) if callable(found) else found)

@@ -14,6 +14,7 @@ from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.inputs import Input, Output
 from gearmbs.mechanism.parts.joints import JOINTS, Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody, centre_marker
+from gearmbs.mechanism.solve.carriers import levers, own_marker, pair_of, unturned
 from gearmbs.mechanism.solve.plant_accelerations import Acceleration
 from gearmbs.wording import any_of, did_you_mean
 
@@ -475,34 +476,6 @@ class PlantNames:
             )
 
 
-def own_marker(body: Body, name: str, make: Callable[..., Marker], *where: Any) -> Marker:
-    """Return the marker of a body that has a name, made by a method of the body if it is not there yet."""
-    return next((one for one in body.markers if one.name == name), None) or make(*where, name=name)
-
-
-def carrier_of(mechanism: Mechanism, element: Any) -> Body:
-    """Return the body from which the turns of the wheels of a mesh count."""
-    return mechanism.bodies.get(mechanism.carriers.get(element.name, ""), mechanism.ground)
-
-
-def unturned(mechanism: Mechanism, marker: Marker, element: Any) -> Marker:
-    """Return the marker of the ground, or a carrier, from which a wheel's turn counts, made if it is not there yet."""
-    body, axes = carrier_of(mechanism, element), marker.global_orientation()
-    name = f"{marker.name} plant {'ground' if body.is_ground else 'carrier'}"
-    if isinstance(body, ModalBody):
-        # its frame, which goes through no node
-        return own_marker(body, name, partial(centre_marker, body, axes=body.orientation.T @ axes))
-    return own_marker(body, name, body.marker_at, marker.global_position(), axes)
-
-
-def count_from_here(mechanism: Mechanism) -> None:
-    """Let transmission errors count from where the wheels are now, wherever bodies are moved afterwards."""
-    for element in mechanism.elements.values():
-        if pair_of(element) is not None:
-            for marker in (element.i, element.j):
-                unturned(mechanism, marker, element)
-
-
 def _at_level(given: Given) -> Given:
     name = given.name if given.level == 0 else f"{given.name} {LEVELS[given.level]}"
     return replace(given, name=name, unit=given.unit_of(given.level))
@@ -523,24 +496,12 @@ def _there(name: Any, names: list[str]) -> str:
     return did_you_mean(str(name), names, shown=repr, otherwise=f"there are {', '.join(names) or 'none'}")
 
 
-def pair_of(element: Any) -> Any:
-    """Return the two wheels of a gear contact or an ideal mesh, None of other elements."""
-    return getattr(element, "pair", None) or getattr(getattr(element, "mesh", None), "pair", None)
-
-
 def has_phase(element: Any) -> bool:
     """Return whether an element is a mesh whose force depends on where teeth are in their cycle."""
     mesh: Any = getattr(element, "mesh", None)
     if getattr(mesh, "pair", None) is not None:
         return mesh.stiffness_curve is not None or mesh.error is not None
     return bool(getattr(element, "pair", None) or getattr(element, "pairs", None))
-
-
-def levers(element: Any) -> tuple[float, float, float]:
-    """Return r_b1 and s r_b2 of a mesh, s = 1 for external and -1 for internal pairs, and its base pitch."""
-    pair = pair_of(element)
-    one, two = pair.driver, pair.driven
-    return float(one.base_radius), float(two.sign * two.base_radius), float(one.base_pitch)
 
 
 def _first_call(text: str, beginnings: Collection[str]) -> tuple[int, int, str] | None:

@@ -204,6 +204,7 @@ class Simulator(Sampled, Restored, Guessed):
         self._simulated, self._took, self._since = 0.0, 0.0, 0.0
         self._jumped: list[float] = []
         """Times at which velocities have jumped with what motions prescribe."""
+        self._looked_at: set[str] = set()
         vars(self)["t"] = 0.0
         self._given = np.empty(0, dtype=np.int64)
         self._begin(initial)

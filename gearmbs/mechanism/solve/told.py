@@ -87,6 +87,8 @@ class Told(OwnAttributes):
     _present: Solution | None
     _points: list[tuple]
     _counted: dict[Any, tuple[tuple, Any]]
+    _looked_at: set[str]
+    """Meshes, see `gearmbs.mechanism.solve.measures.Measures`."""
     _jumped: list[float]
     _records: bool
     _failed: str | None
@@ -168,7 +170,9 @@ class Told(OwnAttributes):
         if what == "evaluate" and COUNTED_FUNCTION.search(str(names[:1])):
             return self._evaluated(*names)
         if what == "transmission_error":
-            return _last(self._mechanism.measures(self._now()).transmission_error(*names))
+            measures = self._mechanism.measures(self._now())
+            measures.looked_at = self._looked_at
+            return _last(measures.transmission_error(*names))
         found = getattr(self._now(), what)
         if names and not callable(found):
             _check_names(what, found, names)
