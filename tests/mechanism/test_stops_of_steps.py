@@ -129,3 +129,49 @@ def test_a_stop_at_a_point_or_by_rounding_behind_it_is_told_once(integrator):
                     # what is told goes on from a state too
                     sim.restore(sim.state())
         assert sorted(told) == ["back", "clock", "twice"]
+
+
+def clocked(led=False):
+    """A free disc under a torque that is set, a clock, and what an input that is set adds to it."""
+    m = Mechanism("disc")
+    disc = m.body("disc", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    pin = m.revolute("pin", disc, m.ground, axis=(0, 0, 1))
+    m.torque("drive", disc, m.input("load", "N m"))
+    if led:
+        m.rotation("turn", pin, m.input("speed", "rad/s"), level="velocity")
+    m.input("u", "s")
+    m.differential_state("clock", "1")
+    m.algebraic_state("sum", "DIF(clock) + u")
+    return m
+
+
+@pytest.mark.parametrize("name", ["load", "speed"])
+@pytest.mark.parametrize("integrator", ["WSTIFF", "GSTIFF"])
+def test_a_stop_at_the_sample_of_a_controller_is_told_once(integrator, name):
+    """The sample lies within a step, in which the clock passes at it but for rounding, before it or behind."""
+    m = clocked(led=name == "speed")
+    for n in (3, 7) if name == "load" else (3,):
+        for points in ((0.027, 0.054), (0.02, 0.04), (0.03, 0.06), (0.06,)):
+            stop = StopAt("clock", 0.01 * n)
+            sim = gm.Simulator(m, 1.0, tol=1e-7, stops=[stop], integrator=integrator)
+            sim.control(name, lambda t, _: 1.0 + t, sample_time=0.01)
+            told = []
+            for end in (*points, 0.08):
+                while (found := sim.advance(end)) is not None:
+                    told.append((found, sim.t))
+            assert told == [(stop, pytest.approx(0.01 * n, rel=1e-12))]
+
+
+@pytest.mark.parametrize("units", [-40, -20, 0, 3])
+def test_a_stop_that_is_told_passes_once_where_what_is_set_moves_it_by_rounding(units):
+    """A few units of the last digit behind a stop its state falls below the value by as few, and passes it again."""
+    stop = StopAt("sum", 0.05)
+    sim = gm.Simulator(clocked(), 1.0, tol=1e-7, stops=[stop])
+    assert sim.advance(0.1) == stop
+    sim.advance(sim.t + 3 * np.spacing(sim.t))
+    sim.set("u", units * np.spacing(0.05))
+    assert (sim.advance(0.1), sim.t) == (None, 0.1)
+    # by more it is another passage
+    sim.set("u", -0.06)
+    assert sim.advance(0.105) == stop
+    assert (sim.advance(0.105), sim.advance(0.2), sim.t) == (None, stop, pytest.approx(0.11, rel=1e-9))

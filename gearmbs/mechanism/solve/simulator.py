@@ -581,14 +581,15 @@ class Simulator(Sampled, Restored, Guessed):
             # the first point is one with what is set before the start, whatever a state has begun
             y = settle_states(self._base.residual, point.t, run.problem.y0, run.problem.yp0, *tables)
             yp = run.problem.yp0
-        told, counted = run.told, self._counted
+        counted = self._counted
         self._begin(State.of(self._base, point.t, y, yp, tables), repair=True)
         self._settings.led = led
         if begun:
             self._problem, self._origin = first
             self._points = points
             self.__dict__["_at"] = point
-            self._run.told, self._counted = told, counted
+            self._run.goes_on_from(run, point.t)
+            self._counted = counted
 
     def __repr__(self) -> str:
         name = self._system.mechanism.name if self._system.mechanism is not None else "mechanism"

@@ -57,8 +57,9 @@ ROWS = 16 * HISTORY
 BLOCK_BYTES = 1 << 18
 """Of values of points that are allotted at a time: about what fits into the second cache."""
 FEWEST_ROWS = 8
-ROUNDED = 4.0 * EPS
-"""Part of the time within which a crossing is the one that has just been told."""
+ROUNDED = 64.0 * EPS
+"""Part of the time within which a crossing is the one that has just been told, or that comes to pass at a point: one is
+found to two units of the last digit, and values that are interpolated or computed anew move it by some ten."""
 
 
 class LastRecords:
@@ -112,6 +113,11 @@ class Rows(NamedTuple):
     """Counted turns, and behind them what named numbers were."""
 
 
+def _are_one(at: float, other: float) -> bool:
+    """Return whether two times of crossings are one but for rounding."""
+    return abs(at - other) <= ROUNDED * abs(at)
+
+
 Numbers = tuple[np.ndarray, bool, bool, bool, bool, bool, bool, bool]
 """What `HeldRun.change` takes."""
 
@@ -153,8 +159,10 @@ class HeldRun(Run):
         self.itself = ref(self)
         self.crossings: list[tuple[float, int]] = []
         """Times and events in the last step."""
-        self.told = dict.fromkeys(range(self.state.n_events), float(problem.t0))
-        """Times at which crossings of each event have last been told; what passes at the start has done so before."""
+        self.told: dict[int, float] = {}
+        """Times at which crossings of each event have last been told."""
+        self.since = float(problem.t0)
+        """Where all has begun: what passes there has done so before."""
         self._errors = options.errors
         self._watched = self.quick = False
         """Whether ``stall`` may have noted something; whether nothing but steps may come on the way to a time."""
@@ -322,8 +330,18 @@ class HeldRun(Run):
         self.told[crossing[1]] = crossing[0]
 
     def _is_told(self, at: float, event: int) -> bool:
-        last = self.told.get(event)
-        return last is not None and abs(at - last) <= ROUNDED * abs(at)
+        return _are_one(at, self.told.get(event, self.since))
+
+    def _just_passed(self, t: float) -> tuple[list[int], list[int]]:
+        """Return which events pass at a time but for rounding and are not told, and these with those that are."""
+        found = {e for at, e in self.crossings if _are_one(at, t)}
+        untold = [e for e in sorted(found) if not self._is_told(t, e)]
+        return untold, sorted(found | {e for e, at in self.told.items() if _are_one(at, t)})
+
+    def goes_on_from(self, run: HeldRun, t: float) -> None:
+        """Tell what another run that ends at a time has not told of it."""
+        self.told, self.since = run.told, run.since
+        self.crossings = [(t, e) for e in run._just_passed(t)[0]]
 
     def _find_crossings(self, t: float) -> None:
         """Find those behind a time in the last step, of which another run has told nothing."""
@@ -365,7 +383,7 @@ class HeldRun(Run):
             run_events(float(st.t), st.y, st.yp, found, st.idata, st.rdata, st.work)
         else:
             run_events(t, rows.y[row], rows.yp[row], found, table, st.rdata, st.work)
-        found[[e for at, e in self.crossings if at == t]] = 0.0
+        found[self._just_passed(t)[1]] = 0.0
         return found
 
     def passed_in_jump(self, before: np.ndarray) -> int | None:
@@ -437,11 +455,11 @@ class HeldRun(Run):
             self.last_records.forget_changes()
         self._given, self._jumped = None, (int(st.steps), t, rows, row)
         if self.problem.events is not None and st.n_events:
-            fired = [e for at, e in self.crossings if at == t]
-            self.crossings = [(at, e) for at, e in self.crossings if at == t and not self._is_told(at, e)]
+            untold, passed = self._just_passed(t)
+            self.crossings = [(t, e) for e in untold]
             self.problem.events(t, st.y, st.yp, st.g_old, st.idata, st.rdata, st.work)
-            # what has just passed does so once
-            st.g_old[fired] = 0.0
+            # what has just passed does so once, on whichever side its value is by rounding
+            st.g_old[passed] = 0.0
 
     def steer(self, point: tuple, first: int, count: int, value: float, end: float) -> int | None:
         """Do the same for an input that only loads depend on, by its places; return what `jumps.steer` does.
