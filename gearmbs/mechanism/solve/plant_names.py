@@ -8,14 +8,18 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.inputs import Input, Output
 from gearmbs.mechanism.parts.joints import JOINTS, Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody, centre_marker
+from gearmbs.mechanism.parts.quantities import quantity
 from gearmbs.mechanism.solve.carriers import levers, own_marker, pair_of, unturned
 from gearmbs.mechanism.solve.plant_accelerations import Acceleration
+from gearmbs.units import QuantityLike
 from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
@@ -52,6 +56,8 @@ class Given:
         The motions it is prescribed by.
     element, lever
         The mesh, and r_b2, negative of internal pairs.
+    speed : float
+        Of its first wheel, rad/s, where an error of its flanks goes with the angle of that; else 0.
     """
 
     kind: str
@@ -65,6 +71,7 @@ class Given:
     joints: tuple[Joint, ...] = ()
     element: Any = None
     lever: float = 1.0
+    speed: float = 0.0
 
     def unit_of(self, level: int) -> str:
         """Return the unit of one of its rates."""
@@ -209,11 +216,17 @@ class PlantNames:
         one = Given("motion", f"motion {joint.name}", base, k, base, joints=(joint,))
         return _at_level(one)
 
-    def _transmission_error(self, mesh: Any, level: str = "position") -> Given:
+    def _transmission_error(self, mesh: Any, level: str = "position", speed: QuantityLike | None = None) -> Given:
         element = self._mesh(mesh)
+        turns = 0.0
+        if speed is not None:
+            label = f"transmission_error '{element.name}': the speed of its first wheel"
+            turns = quantity(speed, "rad/s", label)
+            if not (np.isfinite(turns) and turns):
+                raise ModelError(f"{label} is {turns:g} rad/s; give the one that it turns at, or leave it out")
         one = Given(
             "transmission_error", f"transmission_error {element.name}", "m", _one_of("level", level, LEVELS), "m",
-            element=element, lever=levers(element)[1],
+            element=element, lever=levers(element)[1], speed=turns,
         )  # fmt: skip
         return _at_level(one)
 

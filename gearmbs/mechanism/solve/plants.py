@@ -23,6 +23,7 @@ from gearmbs.mechanism.checks import check_mechanism, warn_of_stiff_seats
 from gearmbs.mechanism.parts.bodies import markers_kept
 from gearmbs.mechanism.parts.elements import State as ElementState
 from gearmbs.mechanism.parts.joints import Joint
+from gearmbs.mechanism.solve.carriers import levers, pair_of
 from gearmbs.mechanism.solve.plant_accelerations import Frame, changed_acceleration, frame_of, told_accelerations
 from gearmbs.mechanism.solve.plant_names import LEVELS, Given, PlantNames, Told, has_phase
 from gearmbs.mechanism.solve.points import instant_at, joint_coordinates, point_of, turns_of
@@ -64,7 +65,9 @@ def linearize(
         * ``("torque", body or marker, axis)``, ``("force", ...)`` with axis "x", "y" or "z": from the ground along a
           global axis, on a body at its centre of mass, N m and N
         * ``("motion", motion, level)``: what a motion prescribes, by its "position" (m, rad), "rate" or "acceleration"
-        * ``("transmission_error", mesh, level)``: an error of the flanks of a gear contact along the line of action, m
+        * ``("transmission_error", mesh, level)``: an error of the flanks of a gear contact along the line of action, m,
+          as a function of time; ``("transmission_error", mesh, level, speed)``: one that goes with the angle of the
+          first wheel, which turns at this speed about its axis, rad/s
     outputs : sequence
         Of texts and tuples:
 
@@ -98,7 +101,7 @@ def linearize(
     -----
     UserWarning
         If the coefficients vary with time along the motion, or are going to, of what is at rest and not in balance:
-        they are those of this instant. So they are of teeth that run.
+        they are those of this instant. So they are of teeth that run. And of a mesh whose teeth do not touch.
 
     Examples
     --------
@@ -261,11 +264,27 @@ class _Columns:
         moved[rates : rates + 3] = change
         pushed = np.cross(along, j.arm) + np.cross(axis, np.cross(spin, j.arm))
         moved[at["u"] + 3 * j.body : at["u"] + 3 * j.body + 3] = -pushed
-        rows = self._unknowns_of(element.name)
+        rows = self.unknowns_of(element.name)
         value[rows] = -(self.matrix[rows] @ moved) / given.lever
         rate[rows] = -(self.matrix[rows] @ sped) / given.lever
+        if given.speed:
+            self._lean(given, rows, rate)
 
-    def _unknowns_of(self, name: str) -> np.ndarray:
+    def _lean(self, given: Given, rows: np.ndarray, rate: np.ndarray) -> None:
+        """Write the torque F u'/Omega of a mesh that carries F on the first wheel, with whose angle its error goes.
+
+        Of the energy k (r_1 phi_1 + r_2 phi_2 - e(phi_1))^2 / 2 the torque on this wheel is -k d (r_1 - de/dphi_1).
+        """
+        first = frame_of(self.instant, given.element.i)
+        if first.body < 0 or self.angle[first.body] < 0:
+            raise ModelError(
+                f"input {given.name!r}: the first wheel of '{given.element.name}' is fixed; leave its speed out"
+            )
+        axis, torque = first.axes[:, 2], self.instant.y[rows[-3:]]
+        share = -float(torque @ axis) / (levers(given.element)[0] * given.speed)
+        self._push(rate, first, first.place, axis, True, share)
+
+    def unknowns_of(self, name: str) -> np.ndarray:
         """Return the places in y of the force and torque of an element, and of its states."""
         instant = self.instant
         force, torque = instant.at["F"], instant.at["N"]
@@ -301,6 +320,7 @@ def _plant(
     reduced = reduce(instant, Inputs(*stacked), joints, balance=True)
     warn_of_varying(reduced)
     _warn_of_running_teeth(mechanism, instant)
+    _warn_of_idle_meshes(columns)
     kinds = instant.system.model.differential_states
     names = [name for name, differential in zip(instant.system.state_names, kinds, strict=True) if differential]
     outputs = [names.index(TOLD.format(k)) for k in range(len(told))]
@@ -340,7 +360,7 @@ def _plant(
             states.append(f"{one.name} ({LEVELS[level]})")
             state_units.append(one.unit_of(level))
     for one, acting in zip(given, found.chains, strict=True):
-        for level in range(one.level - len(acting)):
+        for level in range(len(acting), one.level):
             states.append(f"{one.name} ({LEVELS[level]})")
             state_units.append(one.unit_of(level))
     values = -instant.residual(instant.y)[instant.at["z"] + np.flatnonzero(kinds)][outputs]
@@ -370,6 +390,23 @@ def _warn_of_running_teeth(mechanism: Mechanism, instant: Instant) -> None:
             "instant, and shafts that turn freely have poles of some rad/s and of either sign in place of zeros. Take "
             "the mesh at rest under its load (at='equilibrium', of a drivetrain at='loaded'), or an IdealMesh of its "
             "mean stiffness, or compare several instants"
+        )
+
+
+def _warn_of_idle_meshes(columns: _Columns) -> None:
+    """Warn of meshes whose force depends on no displacement: their teeth do not touch."""
+    instant = columns.instant
+    moves = instant.block("R", "lambda")
+    idle = [
+        repr(name)
+        for name, element in columns.mechanism.elements.items()
+        if pair_of(element) is not None and not np.any(columns.matrix[columns.unknowns_of(name)][:, moves].data)
+    ]
+    if idle:
+        warn(
+            f"plant: of {', '.join(idle)} no teeth touch at t = {instant.t:.6g} s: neither stiffness nor damping of "
+            "that mesh is in it. Take it under load: at='equilibrium' and a time t= at which the load acts, or a state "
+            "or solution that is under way"
         )
 
 
