@@ -251,3 +251,59 @@ def test_turns_behind_a_jump_of_a_prescribed_speed(level, hold, values, angles):
         assert sim.get("output", "angle") == pytest.approx(angle, abs=1e-6)
     np.testing.assert_allclose(sim.solution().joint_angle("pin")[1:], angles, atol=1e-6)
     np.testing.assert_allclose(sim.solution().output("angle")[1:], angles, atol=1e-6)
+
+
+def driven(kind, opposite=False):
+    """A disc that a motion turns by some fifteen turns in a second, which nothing counts; its angle at a time."""
+    m = Mechanism("driven")
+    disc = m.body("disc", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    axes = np.diag([-1.0, -1.0, 1.0]) if opposite else np.eye(3)
+    pin = m.joint("revolute", "pin", disc.marker_at((0, 0, 0), axes, name="I"), m.ground.marker(name="J"))
+    given, level, angle = {
+        "speed": (gm.mechanism.constant(100.0), "velocity", lambda t: 100.0 * t),
+        "input": (m.input("speed", "rad/s", 100.0), "velocity", lambda t: 100.0 * t),
+        "text": ("100*TIME + SIN(TIME)", "displacement", lambda t: 100.0 * t + np.sin(t)),
+        "text of a speed": ("100 + COS(TIME)", "velocity", lambda t: 100.0 * t + np.sin(t)),
+        "ahead": (gm.mechanism.polynomial([20.0, 100.0]), "displacement", lambda t: 20.0 + 100.0 * t),
+    }[kind]
+    begins = -np.pi if opposite else 0.0
+    m.rotation("drive", pin, given, level=level, **({} if level == "displacement" else {"start": 0.0}))
+    return m, lambda t: angle(t) + begins
+
+
+@pytest.mark.parametrize("opposite", [False, True])
+@pytest.mark.parametrize("kind", ["speed", "input", "text", "text of a speed", "ahead"])
+def test_joints_that_motions_drive_begin_at_the_turns_of_a_state(kind, opposite):
+    """In another simulator and in a run; the angle is the one that the motion prescribes, half a turn off as drawn."""
+    m, angle = driven(kind, opposite)
+    az = 'AZ("I", "J")'
+    sim = gm.Simulator(m, t_end=1.0, tol=1e-8)
+    sim.advance(0.04)
+    sim.advance(0.06)
+    other = gm.Simulator(m, t_end=1.0, tol=1e-8, initial=sim.state())
+    for one in (sim, other):
+        assert one.get("joint_angle", "pin") == pytest.approx(angle(0.06), abs=1e-5)
+        assert one.get("evaluate", az) == pytest.approx(angle(0.06), abs=1e-5)
+        one.advance(0.07)
+        assert one.get("joint_angle", "pin") == pytest.approx(angle(0.07), abs=1e-5)
+    found = m.simulate(0.1, initial=sim.state(), rate=1000)
+    np.testing.assert_allclose(found.joint_angle("pin"), angle(found.t), atol=1e-5)
+    np.testing.assert_allclose(found.evaluate(az), angle(found.t), atol=1e-5)
+
+
+def test_a_speed_that_was_set_goes_on_with_its_turns():
+    m, _ = driven("input")
+    sim = gm.Simulator(m, t_end=1.0)
+    sim.advance(0.1)
+    sim.set("speed", 50.0)
+    sim.advance(0.2)
+    state = sim.state()
+    for lump in (False, True):
+        if lump:
+            sim = gm.Simulator(m, t_end=1.0, lump=True)
+            sim.advance(0.1)
+            sim.set("speed", 50.0)
+            sim.advance(0.2)
+            state = sim.state()
+        other = gm.Simulator(m, t_end=1.0, initial=state, lump=lump)
+        assert other.get("joint_angle", "pin") == pytest.approx(15.0, abs=1e-6)

@@ -10,6 +10,7 @@ from gearmbs._display import html_table, readable
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.equations.loads.time_functions import evaluate
 from gearmbs.dae.model.model import Names
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.frames import (
@@ -58,10 +59,7 @@ class Measures:
         speed = _dot(self._spin(found.i) - self._spin(found.j), aj[:, :, 2])
         jumps = rows_of_jumps(t, self.solution.jumped)
         steps = mean_speeds(speed, jumps) * np.diff(t)
-        known = known_turns(
-            self.solution, "AZ", found.i.name, found.j.name,
-            self.mechanism.turns.get(("AZ", found.i.name, found.j.name)),
-        )  # fmt: skip
+        known = self._known_turns("AZ", found.i.name, found.j.name)
         if not np.isnan(known).any():
             return wanted + 2 * np.pi * np.round((known - wanted) / (2 * np.pi))
         # each step is the one nearest to what the speeds make of it
@@ -96,6 +94,39 @@ class Measures:
         if found.kind not in kinds:
             raise ModelError(f"joint '{name}' is {found.kind}; {what} is for {', '.join(kinds)} joints")
         return found
+
+    def _known_turns(self, function: str, i: str, j: str) -> np.ndarray:
+        """Return an angle as the run counts it, see there, or where the run starts as a motion prescribes it."""
+        known = known_turns(self.solution, function, i, j, self.mechanism.turns.get((function, i, j)))
+        if function != "AZ" or not known.size or known[0] == known[0] or known.size < self.solution.t.size:
+            return known
+        solution, system = self.solution, self.solution.system
+        if solution.t[0] != solution.problem.t0:
+            return known
+        for joint in self.mechanism.joints.values():
+            if joint.kind == "rotation" and (joint.i.name, joint.j.name) == (i, j):
+                label = f"{joint.name}: {joint.rows[0].label}"
+                if label in system.row_names:
+                    angle = self._prescribed(joint, system.row_names.index(label))
+                    ai, aj = self._axes(joint.i)[0], self._axes(joint.j)[0]
+                    turned = aj[:, :2] @ np.array([np.cos(angle), np.sin(angle)])
+                    # it may hold the axes x opposite, as they were drawn
+                    known[0] = angle if turned @ ai[:, 0] > 0.0 else angle - np.pi
+        return known
+
+    def _prescribed(self, motion: Joint, row: int) -> float:
+        """Return the angle that a motion prescribes where the run starts, rad, with what is set in it."""
+        function, problem, model = motion.rows[0].rotation, self.solution.problem, self.solution.system.model
+        assert function is not None
+        if function.is_expression:
+            first = next(iter(self.solution.parts(np.array([0]))))
+            return float(self.mechanism.measures(first).expression(function.text)[0])
+        kind, at = model.functions[model.terms[model.spans[row].start, T.TERM_FUNCTION]]
+        table = problem.rdata.copy()
+        if self.solution.result.held is not None:
+            cells, held = self.solution.result.held
+            table[cells] = held[0]
+        return float(evaluate(kind, table, int(problem.idata[T.H_R_FUNCTION]) + int(at), float(problem.t0))[0])
 
     # --- markers ------------------------------------------------------------------------------------
 
@@ -264,7 +295,7 @@ class Measures:
         if starts is None:
             starts = np.array(starting_angles(tape, self.mechanism.turns, marker_named))
         named = [(f, marker_named(i), marker_named(j)) for f, i, j in tape.angles]
-        known = [known_turns(self.solution, *names, self.mechanism.turns.get(names)) for names in named]
+        known = [self._known_turns(*names) for names in named]
         jumps = rows_of_jumps(t, self.solution.jumped)
         return expression_values(tape, starts, known, t, jumps, kin, acc, bodies, frames, y, marker_named)
 
