@@ -297,6 +297,45 @@ def test_a_state_holds_what_controllers_remember(tmp_path):
         sim.state()
 
 
+def test_a_state_tells_of_controllers_that_remember_nothing(tmp_path):
+    """Of a plain function when it samples: it goes on there, in another simulator too, and whoever lacks it is told."""
+
+    def made(**options):
+        sim = gm.Simulator(two_discs(), 1.0, **options)
+        sim.control("load", lambda t, s: 3.0 - s.get("angular_velocity", "a")[2], 3e-4)
+        return sim
+
+    sim = made()
+    sim.advance(0.0104)
+    state = sim.state()
+    sim.advance(0.02)
+    wanted = unknowns(sim)
+    sim.restore(state)
+    for other in (sim, made(initial=state), made(initial=gm.State.load(state.save(tmp_path / "s.npz")))):
+        other.advance(0.02)
+        np.testing.assert_array_equal(unknowns(other)[2:], wanted[2:])
+    bare = gm.Simulator(two_discs(), 1.0, initial=state)
+    assert bare.awaited == ["load"]
+    with pytest.warns(UserWarning, match=says("'load'", "control(...)")):
+        bare.advance(0.02)
+
+
+def test_what_has_a_controller_is_not_set_besides():
+    """At a sample the controller would write over it in silence; another input is set as ever."""
+    m = two_discs()
+    m.input("other", "N m")
+    m.torque("more", m.bodies["a"], m.inputs["other"])
+    sim = gm.Simulator(m, 1.0)
+    sim.control("load", lambda t, s: 70.0, 1e-3)
+    sim.advance(0.01)
+    for name in ("load", m.inputs["load"]):
+        with pytest.raises(ModelError, match=says("'load'", "controller", "return")):
+            sim.set(name, 10.0)
+    sim.set("other", 10.0)
+    sim.advance(0.0105)
+    assert (sim.get("input", "load"), sim.get("input", "other")) == (70.0, 10.0)
+
+
 def test_a_controller_does_not_go_on_itself():
     sim = gm.Simulator(two_discs(), 1.0)
     sim.control("load", lambda t, s: 1.0 if t < 0.25 else s.advance(t + 0.1), 0.1)
@@ -383,7 +422,7 @@ def test_what_is_wrong_is_said_in_a_line(call, words):
     with pytest.raises(ModelError, match=says(*words)) as error:
         call(sim)
     assert "\n" not in str(error.value)
-    sim.set("load", "3 N m")
+    sim.set("given", "3 deg", hold=1)
     sim.advance(0.01)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from gearmbs.dae.problem import ModelError, Number
 from gearmbs.dae.state import Memory, State
 from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.wording import warn
 
 RESOLVED = 1e-12
@@ -23,8 +24,8 @@ def warn_of_unmet(names: Iterable[str]) -> None:
     """Warn that a state has controllers of inputs which nobody has given again, so that these are held."""
     listed = ", ".join(map(repr, names))
     warn(
-        f"state: it has the memory of controllers of {listed}, and none is given: what they set stays as it is; give "
-        "them again with control(...) before advance"
+        f"state: it has controllers of {listed}, and none is given: what they set stays as it is; give them again with "
+        "control(...) before advance"
     )
 
 
@@ -62,13 +63,16 @@ class Control:
         return all(callable(getattr(self.function, name, None)) for name in ("state", "restore"))
 
     def memory(self) -> Memory:
-        """Return when it samples, and what the function remembers.
+        """Return when it samples, and what the function remembers: of one that cannot tell no numbers.
 
         Raises
         ------
         ModelError
             If that is no array of numbers.
         """
+        schedule = np.array([self.start, self.period, self.count])
+        if not self.remembers:
+            return Memory(schedule, np.empty(0))
         told: Any = self.function.state()  # type: ignore[attr-defined]
         try:
             numbers = np.array(told, dtype=float)
@@ -76,7 +80,7 @@ class Control:
             raise ModelError(
                 f"control: state() of the controller of {self.name!r} returns {told!r}; let it return numbers"
             ) from None
-        return Memory(np.array([self.start, self.period, self.count]), numbers)
+        return Memory(schedule, numbers)
 
     def go_back(self, t: float, memory: Memory | None) -> None:
         """Go on as it was at a time; without a memory the next sample is the first that is not before.
@@ -86,14 +90,16 @@ class Control:
         UserWarning
             If it cannot take the memory.
         """
-        if memory is not None and self.remembers and memory.schedule[1] == self.period:
+        knows = memory is not None and (self.remembers or not memory.numbers.size)
+        if memory is not None and knows and memory.schedule[1] == self.period:
             self.start, self.count = float(memory.schedule[0]), int(memory.schedule[2])
-            self.function.restore(memory.numbers.copy())  # type: ignore[attr-defined]
+            if memory.numbers.size:
+                self.function.restore(memory.numbers.copy())  # type: ignore[attr-defined]
             return
         if memory is not None:
             theirs = float(memory.schedule[1])
             why, remedy = "it has no state() and restore(numbers)", "give it both"
-            if self.remembers:
+            if knows:
                 why = f"it samples each {self.period:g} s, in the state each {theirs:g} s"
                 remedy = f"take sample_time={theirs:g}"
             warn(
@@ -112,6 +118,7 @@ class Sampled:
     t_end: float
     number: Callable[[str], Number]
     set: Callable[..., None]
+    _settings: Settings
     _controls: list[Control]
     _unmet: list[str]
     _origin: State | None
@@ -177,6 +184,15 @@ class Sampled:
         self._controls.append(made)
         self.__dict__["_ready"] = None
 
+    def _check_free(self, name: str) -> None:
+        """Raise a ModelError if an input has a controller, which would write over what is set at its next sample."""
+        number = self.number(name)
+        if any(self.number(one.name) is number for one in self._controls):
+            raise ModelError(
+                f"set: {name!r} has a controller, which sets it at its samples; let that return the value, or make an "
+                "input of your own beside it"
+            )
+
     def _sample(self, t: float) -> float:
         """Call the controllers whose sample time has come; return the next one of any, or ``t`` if that is earlier."""
         own = self.__dict__
@@ -189,7 +205,7 @@ class Sampled:
                 finally:
                     own["_inside"] = ""
                 try:
-                    self.set(control.name, value)
+                    self._settings.set(control.name, value, 0)
                 except ModelError as error:
                     raise ModelError(f"control: what the controller returns at t = {self.t:.6g} s: {error}") from None
                 control.count += 1

@@ -83,8 +83,7 @@ class Restored(Told):
         else:
             state = self._at_start(run, Point(*point))
         if own["_controls"]:
-            held = {control.name: control.memory() for control in self._controls if control.remembers}
-            return replace(state, controllers=held) if held else state
+            return replace(state, controllers={control.name: control.memory() for control in self._controls})
         return state
 
     def _with_history(self, run: HeldRun, point: tuple) -> State:

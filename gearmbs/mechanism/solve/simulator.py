@@ -472,10 +472,13 @@ class Simulator(Sampled, Restored, Guessed):
         Raises
         ------
         ModelError
-            For a name that is not there, a value that is no number in its unit, and an input that would let a body
-            jump: the position of a motion with ``hold=0``.
+            For a name that is not there, a value that is no number in its unit, an input that has a controller, and
+            one that would let a body jump: the position of a motion with ``hold=0``.
         """
-        settings = self.__dict__["_settings"]
+        own = self.__dict__
+        settings = own["_settings"]
+        if own["_controls"]:
+            self._check_free(name)
         if type(name) is str and name in settings.plain and type(value) is float and value - value == 0.0:
             if type(hold) is int and -1 < hold < 2:
                 # an input that only loads depend on takes any number
