@@ -26,7 +26,6 @@ from gearmbs.mechanism import Mechanism, ModelError
 from gearmbs.mechanism.parts import functions
 from gearmbs.studies import flexible_rig
 from gearmbs.studies.run.simulation import case_mechanism
-from tests.docs.support import blocks
 from tests.drivetrain.support import stage
 from tests.drivetrain.test_kinds_of_wheels import QUIET
 from tests.mechanism.agreement import assert_all_names_agree
@@ -518,16 +517,6 @@ def test_planetary_set():
     assert_all_names_agree(m, sim, one)
     run = m.simulate(0.02, t_eval=times[20:], tol=1e-5, initial=state)
     np.testing.assert_array_equal(run.result.y, one.result.y[20:])
-
-
-@pytest.mark.slow
-def test_the_environment_balances_its_pole(capsys):
-    """The page's policy, made of the linear plant, keeps the pole up for whole episodes; without it the pole falls."""
-    page = Path(__file__).parents[2] / "docs" / "notebooks" / "environment.md"
-    exec("\n".join(block.code for block in blocks(page) if block.language == "code-cell"), {})
-    told = capsys.readouterr().out.splitlines()
-    assert [line.split()[-1] for line in told[:3]] == ["balanced"] * 3
-    assert told[4].startswith("fallen")
 
 
 def rolling_train():
