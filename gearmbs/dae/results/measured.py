@@ -49,7 +49,7 @@ class Measured:
         return self._measures().deflection(marker)
 
     def transmission_error(self, mesh: object) -> np.ndarray:
-        """Return r_b1 phi_1 + s r_b2 phi_2 of a gear contact, shape (m,), m; by contact or name.
+        """Return r_b1 phi_1 + s r_b2 phi_2 of a mesh, shape (m,), m; by element or name.
 
         s is 1 for external and -1 for internal pairs; angles about the wheels' own axes, up to a base pitch. Where
         wheel 1 drives and turns positively about its axis it is positive if the other lags, else negative.

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from gearmbs.dae.problem import ModelError
-from gearmbs.mechanism.forces.friction import FrictionForce
 from gearmbs.mechanism.forces.springs import LineSpring, MatrixForce
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import COMPONENTS, ForceElement, Load
 from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle
 from gearmbs.mechanism.parts.modal import ModalBody, centre_marker
-
-if TYPE_CHECKING:
-    from gearmbs.mechanism.mechanism import Mechanism
 
 CARRIED = 0.1
 """Part of the centre distance by which a wheel may stand off the line about which what it is on turns, and turn of a
@@ -27,8 +23,20 @@ TURNING = ("revolute", "spherical", "self_aligning", "cylindrical", "universal",
 """Kinds of joints that hold a point across an axis and let bodies turn about it."""
 UNTURNING = ("translational", "orientation")
 """Kinds of joints that let bodies move, and not turn."""
+OTHERS = ("contact", "friction")
+"""Kinds of force elements that hold nothing where it is."""
 RESISTS = 1e-6
 """Part of the largest stiffness against turns above which there is one about an axis: rounding of axes is below it."""
+
+
+class Meshing(Protocol):
+    """What is looked at of a mechanism."""
+
+    ground: Body
+    bodies: dict[str, Body]
+    joints: dict[str, Joint]
+    elements: dict[str, Any]
+    carriers: dict[str, str]
 
 
 class Support(NamedTuple):
@@ -58,7 +66,7 @@ class Support(NamedTuple):
 class Supports:
     """What bodies that are fixed to each other, one group each, stand on."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Meshing) -> None:
         self.ground = mechanism.ground.name
         self.group = {name: name for name in (self.ground, *mechanism.bodies)}
         for joint in mechanism.joints.values():
@@ -111,9 +119,9 @@ def _holds(element: Any) -> bool:
         return element.mode == COMPONENTS and element.has_force
     if isinstance(element, MatrixForce):
         return bool(np.any(element.stiffness[:3, :3]))
-    if not isinstance(element, ForceElement) or isinstance(element, LineSpring | FrictionForce):
+    if not isinstance(element, ForceElement) or isinstance(element, LineSpring) or element.kind in OTHERS:
         return False
-    return element.has_force and len(element.markers) == 2 and pair_of(element) is None and element.kind != "contact"
+    return element.has_force and len(element.markers) == 2 and pair_of(element) is None
 
 
 def _support(part: Any, here: Marker, there: Marker, other: str, along: np.ndarray) -> Support:
@@ -162,7 +170,7 @@ def what_carries(supports: Supports, wheel: Marker, near: float) -> Body | None:
     return found
 
 
-def carrier_of(mechanism: Mechanism, element: Any) -> Body:
+def carrier_of(mechanism: Meshing, element: Any) -> Body:
     """Return the body from which the turns of the wheels of a mesh count.
 
     Raises
@@ -183,7 +191,7 @@ def carrier_of(mechanism: Mechanism, element: Any) -> Body:
     return mechanism.ground
 
 
-def _carried(mechanism: Mechanism, element: Any) -> tuple[Marker, Body] | None:
+def _carried(mechanism: Meshing, element: Any) -> tuple[Marker, Body] | None:
     """Return a wheel of a mesh whose axis is carried around, and what carries it; None if both stay."""
     supports = Supports(mechanism)
     near = CARRIED * float(np.linalg.norm(element.j.global_position() - element.i.global_position()))
@@ -199,7 +207,7 @@ def how_to_name(mesh: str, carrier: str = "body") -> str:
     )
 
 
-def unturned(mechanism: Mechanism, marker: Marker, element: Any) -> Marker:
+def unturned(mechanism: Meshing, marker: Marker, element: Any) -> Marker:
     """Return the marker of the ground, or a carrier, from which a wheel's turn counts, made if it is not there yet."""
     body, axes = carrier_of(mechanism, element), marker.global_orientation()
     name = f"{marker.name} plant {'ground' if body.is_ground else 'carrier'}"
@@ -214,7 +222,7 @@ def own_marker(body: Body, name: str, make: Callable[..., Marker], *where: Any) 
     return next((one for one in body.markers if one.name == name), None) or make(*where, name=name)
 
 
-def count_from_here(mechanism: Mechanism) -> None:
+def count_from_here(mechanism: Meshing) -> None:
     """Let transmission errors count from where the wheels are now, wherever bodies are moved afterwards."""
     for element in mechanism.elements.values():
         if pair_of(element) is None or (element.name not in mechanism.carriers and _carried(mechanism, element)):
