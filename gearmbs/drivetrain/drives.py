@@ -17,7 +17,8 @@ from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, fixed_value
 from gearmbs.drivetrain.torque_element import OWN, ShaftTorque, on_curve, slopes
 from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function, constant, polyline_integral, ramp, step
-from gearmbs.mechanism.parts.joints import Joint, Row, Term
+from gearmbs.mechanism.parts.inputs import Input
+from gearmbs.mechanism.parts.joints import Joint, Prescribed, Row, Term
 from gearmbs.schema.quantities import Measure, OverTime
 from gearmbs.units import Quantity
 
@@ -80,14 +81,21 @@ class SpeedDrive(Drive):
         A run-up or coast-down: points from the end of the drivetrain's ``run_up`` on, joined by straight lines, see
         `gearmbs.mechanism.polyline`; none faster than ``speed``, all in its sense. Before the first point its speed is
         held, or reached from rest.
+    reference : TimeFunction or str, optional
+        The speed over the time of the simulation, rad/s with the sign of ``speed``, in place of the run-up: an input
+        (`gearmbs.mechanism.make_input`) may jump while a simulation goes on, or have a controller.
     """
 
     kind: ClassVar[str] = "speed"
     function: Any = None
     curve: Any = None
+    reference: Any = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.reference is not None:
+            require(self.function is None and self.curve is None,
+                    f"{self.label}: give one of reference, function and curve")  # fmt: skip
         if self.curve is None:
             return
         require(self.function is None, f"{self.label}: give function or curve, not both")
@@ -132,12 +140,20 @@ class SpeedDrive(Drive):
             return polyline_integral(times, speeds, soft_start=True)
         if self.function is not None:
             return as_function(self.function, "rad", self.label)
+        if self.reference is not None:
+            return as_function(self.reference, "rad/s", self.label).integral(0.0)
         return ramp(speed, over=0.0 if running else run_up)
 
     def add(self, at: Attached) -> None:
         turned = self.turned(at.speed, at.run_up, at.running)
         row = Row("angle", (Term(terms.ROTATION, at.i, at.j),), None, turned)
-        at.mechanism.joints[self.name] = Joint(self.name, "rotation", at.i, at.j, [row])
+        given = None
+        if self.reference is not None:
+            wanted = as_function(self.reference, "rad/s", self.label)
+            if isinstance(wanted, Input):
+                at.mechanism.inputs.setdefault(wanted.name, wanted)
+            given = Prescribed("velocity", wanted, 0.0, 0.0)
+        at.mechanism.joints[self.name] = Joint(self.name, "rotation", at.i, at.j, [row], given)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,6 +19,7 @@ from gearmbs.mechanism.forces.springs import SI_UNITS, AxisSpring, Beam, Bushing
 from gearmbs.mechanism.parts import elements as el
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import Load
+from gearmbs.mechanism.parts.inputs import Input, Parameter, number_text
 from gearmbs.mechanism.parts.modal import ModalBody, ShapedMarker
 from gearmbs.mechanism.parts.quantities import Vector, expression_text, keeps_given, quantity, vector
 from gearmbs.units import QuantityLike
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from gearmbs.mechanism.contacts.shapes import Shape
     from gearmbs.mechanism.language.syntax import Units
 
-Expression = str | float | None
+Expression = str | float | Input | Parameter | None
 
 M = TypeVar("M", bound=MatrixForce)
 
@@ -43,11 +44,21 @@ class LoadMethods:
     ground: Body
     reads_units: bool
     given: dict[str, dict[str, Any]]
+    parameters: dict[str, Parameter]
+    _take_inputs: Callable[..., None]
     add: Callable[[Any], Any]
     _add_load: Callable[[Load], Load]
 
     def _text(self, label: str, value: Expression, dimension: str) -> str:
-        """Return an expression, or the number a text with a unit stands for."""
+        """Return an expression, that of an input or a parameter, or the number a text with a unit stands for."""
+        if isinstance(value, Input | Parameter):
+            if isinstance(value, Input):
+                self._take_inputs(value)
+            elif self.parameters.get(value.name) is not value:
+                raise ModelError(
+                    f"{label}: parameter {value.name!r} is none of the mechanism's; make it by parameter(...)"
+                )
+            return number_text(value, SI_UNITS[dimension], self.units, self.units.factor(dimension), label)
         if not self.reads_units:
             return str(value)
         return expression_text(value, SI_UNITS[dimension], label, self.units.factor(dimension))

@@ -341,6 +341,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
             self._check_body(label, marker.body)
         for marker in markers:
             marker.body.check(element)
+        self._take_inputs(*vars(element).values())
         self.elements[element.name] = element
         return element
 

@@ -160,6 +160,14 @@ class ValueMethods:
         """Name a list of numbers; expressions use them as ARYVAL(name, position), counted from 1."""
         self.arrays[name] = tuple(float(v) for v in np.asarray(numbers, dtype=float).ravel())
 
+    def _take_inputs(self, *values: Any) -> None:
+        """Let inputs that were made elsewhere, alone or in tuples, be among those of the mechanism."""
+        for value in values:
+            for one in value if isinstance(value, tuple) else (value,):
+                if isinstance(one, Input) and one.order == 0 and one.name not in self.inputs:
+                    self._check_number(one.name, "input")
+                    self.inputs[one.name] = one
+
     def _check_number(self, name: str, what: str) -> None:
         tables: dict[str, Mapping[str, Any]] = {"input": self.inputs, "parameter": self.parameters}
         for title, table in {**tables, "output": self.outputs}.items():

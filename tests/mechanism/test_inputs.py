@@ -110,3 +110,52 @@ def test_a_deck_has_inputs_as_variables(tmp_path):
     result = gm.run_deck(gm.read_deck(tmp_path / "disc.adm"), end=1.0, steps=10)
     speed = m.simulate(1.0).angular_velocity("disc")[-1, 2]
     assert np.abs(result.request(1)[-1] - speed).min() == pytest.approx(0.0, abs=1e-3 * speed)
+
+
+def test_inputs_and_parameters_stand_in_forces_as_they_are():
+    """The object, as the text with its name: 2 w' = 4, then 4 + 6 and -0.5 of the other side; in mm too."""
+    m, _, pin = disc()
+    m.axis_torque("drive", pin.i, pin.j, m.input("load", "N m", 4.0))
+    m.load("more", pin.i, pin.j, tz=m.parameter("extra", "N m", 6.0))
+    m.axis_force("push", pin.i, pin.j, make_input("elsewhere", "N"))
+    assert list(m.inputs) == ["load", "elsewhere"]
+    sim = gm.Simulator(m, 1.0)
+    sim.set("elsewhere", 3.0)
+    sim.advance(0.2)
+    sim.set("extra", -5.0)
+    sim.advance(0.4)
+    assert sim.get("angular_velocity", "disc")[2] == pytest.approx(0.2 * 5.0 - 0.2 * 0.5, rel=1e-6)
+    plant = m.linearize(["load", "elsewhere"], [("joint_rate", "pin"), ("reaction", "pin", "fz")])
+    np.testing.assert_allclose(plant.frequency_response(1.0)[0, :, 1], [0.0, -1.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda m, d, p: m.axis_torque("t", p.i, p.j, m.input("u", "N")), ("sforce 't'", "'u'", "N*m")),
+        (lambda m, d, p: m.axis_torque("t", p.i, p.j, m.parameter("k", "N", 1.0)), ("sforce 't'", "'k'", "N*m")),
+        (lambda m, d, p: m.axis_torque("t", p.i, p.j, Mechanism("o").parameter("k", "N m", 1.0)), ("'k'", "parameter")),
+        (lambda m, d, p: m.torsion_spring("s", p.i, p.j, stiffness=m.parameter("k", "N m/rad", 1.0)), ("'s'", "'2*k'")),
+        (lambda m, d, p: m.torque("t", d, m.parameter("k", "N m", 1.0)), ("'t'", "'2*k'")),
+        (lambda m, d, p: m.torque("t", d, lambda t: 3.0), ("'t'", "m.function", "F(TIME)")),
+        (lambda m, d, p: m.rotation("r", p, lambda t: 3.0), ("'r'", "m.function", "F(TIME)")),
+        (lambda m, d, p: (m.parameter("u", "N m", 1.0), m.torque("t", d, make_input("u", "N m"))), ("'u'", "parameters")),
+    ],
+)
+def test_what_stands_where_it_cannot_is_said_in_a_line(call, words):
+    with pytest.raises(ModelError, match=says(*words)) as error:
+        call(*disc())
+    assert "\n" not in str(error.value)
+
+
+def test_functions_of_python_are_torques_and_motions_by_a_name():
+    """What the refusal of a bare one says: 2 w' = 3 t, and the angle of another disc is t^2."""
+    m, _, pin = disc()
+    m.function("PUSH", lambda t: 3.0 * t)
+    m.axis_torque("drive", pin.i, pin.j, "PUSH(TIME)")
+    other = m.body("other", mass=1.0, inertia=(2.0, 2.0, 2.0))
+    m.function("TURN", lambda t: t**2)
+    m.rotation("led", m.revolute("its pin", other, m.ground, axis=(0, 0, 1)), "TURN(TIME)")
+    solution = m.simulate(1.0, tol=1e-8)
+    assert solution.angular_velocity("disc")[-1, 2] == pytest.approx(0.75, abs=1e-6)
+    assert solution.joint_angle("its pin")[-1] == pytest.approx(1.0, abs=1e-6)

@@ -5,7 +5,7 @@ import pytest
 
 import gearmbs as gm
 from gearmbs.studies.run.simulation import case_mechanism
-from tests.mechanism.agreement import assert_all_names_agree
+from tests.mechanism.agreement import add_outputs_of_all_kinds, assert_all_names_agree
 from tests.mechanism.test_stepping import PAIR, flexible_pair, planets, rolling_train, slider_crank
 
 
@@ -45,6 +45,9 @@ def rolling(formulation):
 @pytest.mark.slow
 def test_every_name_at_a_point_is_that_of_the_solution(model, formulation):
     m, end, options = model(formulation)
+    if model is not crank:
+        # by the name of an output, too
+        assert len(add_outputs_of_all_kinds(m)) > 30
     times = np.linspace(0.0, end, 42)
     sim, ahead = (gm.Simulator(m, end, **options) for _ in range(2))
     if "push" in m.elements:

@@ -7,18 +7,35 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.model.system import System
+from gearmbs.dae.problem import DAEProblem
+from gearmbs.dae.result import DAEResult
 
 
 class Measured:
     """The part of a `gearmbs.dae.results.solution.Solution` that asks the mechanism what its names stand for."""
 
     system: System
+    problem: DAEProblem
+    result: DAEResult
 
     def _measures(self):
         mechanism = self.system.mechanism
         if mechanism is None:
             raise ValueError("the solution does not know its mechanism, so nothing can be asked of it by name")
         return mechanism.measures(self)
+
+    def unknown(self, name: str) -> np.ndarray:
+        """Return an unknown of the equations by its name, as ``eps_psi(rod)`` or ``lambda(pin: coincident x)``, (m,).
+
+        Raises
+        ------
+        KeyError
+            For a name that is not there.
+        """
+        names = self.problem.names
+        if name not in names:
+            raise KeyError(f"unknown {name!r}; there are {', '.join(names)}")
+        return self.result.y[:, names.index(name)].copy()
 
     def joint_angle(self, joint: object) -> np.ndarray:
         """Return the rotation of a joint's I about z_J with full turns counted, shape (m,), rad; by joint or name."""

@@ -326,8 +326,9 @@ def as_function(
         return expression(expression_text(value, unit, field))
     if callable(value):
         raise ModelError(
-            f"{field}: a function of Python cannot be compiled; give a number, an expression such as '0.1*SIN(5*TIME)' "
-            "or one of step, ramp, harmonic, polynomial"
+            f"{field}: a function of Python is not compiled as it is; give it a name, m.function('F', function), and "
+            "the text 'F(TIME)', or give a number, an expression such as '0.1*SIN(5*TIME)', or one of step, ramp, "
+            "harmonic, polynomial"
         )
     return constant(quantity(value, unit, field))
 

@@ -16,27 +16,13 @@ from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.language.syntax import DIMENSIONS as LANGUAGE
 from gearmbs.mechanism.language.syntax import Name, Units, parse
 from gearmbs.mechanism.parts.functions import TimeFunction, function_text
-from gearmbs.mechanism.parts.quantities import quantity
+from gearmbs.mechanism.parts.quantities import NoNumber, quantity
 from gearmbs.units import DIMENSIONS, beyond_mechanics, powers_of
 
 COEFFICIENTS = tf.PIECE_SIZE - 1
 """Number of coefficients of the polynomial that an input is as a function of time."""
 RESERVED = ("TIME", "PI", "DTOR", "RTOD")
 """Names that mean something else in expressions."""
-
-
-class NoNumber:
-    """What has a name that expressions calculate with, and no value that Python could."""
-
-    name: str
-
-    def _calculate(self, *_: Any) -> Any:
-        raise ModelError(
-            f"{self.name!r} has a value in the equations alone; calculate in an expression, such as '2*{self.name}'"
-        )
-
-    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = _calculate
-    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = __float__ = _calculate
 
 
 @dataclass(frozen=True)
@@ -69,9 +55,7 @@ class Input(NoNumber, TimeFunction):
 
     def check_unit(self, unit: str, field: str) -> None:
         """Raise a ModelError if it is no function of a unit or dimension."""
-        own, wanted = powers_of(self.unit), powers_of(unit)
-        if (own and own[1]) != (wanted and wanted[1]):
-            raise ModelError(f"{field}: input {self.name!r} is in {self.unit}, not in {DIMENSIONS.get(unit, unit)}")
+        _check_unit(self, "input", unit, field)
 
     def __repr__(self) -> str:
         return f"Input({self.name!r}, {self.start:g} {self.unit})"
@@ -85,6 +69,12 @@ class Parameter(NoNumber):
     unit: str
     start: float
     """Value until it is set."""
+
+
+def _check_unit(made: Input | Parameter, kind: str, unit: str, field: str) -> None:
+    own, wanted = powers_of(made.unit), powers_of(unit)
+    if (own and own[1]) != (wanted and wanted[1]):
+        raise ModelError(f"{field}: {kind} {made.name!r} is in {made.unit}, not in {DIMENSIONS.get(unit, unit)}")
 
 
 AXES = ("x", "y", "z")
@@ -290,9 +280,21 @@ def text_of(function: TimeFunction, units: Units, value: float) -> str:
         For a kind without such an expression.
     """
     if isinstance(function, Input) and function.order == 0:
-        factor = unit_factor(units, function.unit) / value
-        return f'"{function.name}"' if factor == 1.0 else f'{factor!r}*"{function.name}"'
+        return number_text(function, function.unit, units, value, function.name)
     return function_text(function, units.time, value)
+
+
+def number_text(made: Input | Parameter, unit: str, units: Units, value: float, field: str) -> str:
+    """Return the expression that an input or a parameter of a unit is; the other parameters are those of `text_of`.
+
+    Raises
+    ------
+    ModelError
+        If it has another unit.
+    """
+    _check_unit(made, "input" if isinstance(made, Input) else "parameter", unit, field)
+    factor = unit_factor(units, made.unit) / value
+    return f'"{made.name}"' if factor == 1.0 else f'{factor!r}*"{made.name}"'
 
 
 def _piece(coefficients: Sequence[float]) -> tuple[float, ...]:
@@ -300,4 +302,4 @@ def _piece(coefficients: Sequence[float]) -> tuple[float, ...]:
     return (1.0, 0.0, *coefficients, *([0.0] * (COEFFICIENTS - len(coefficients))))
 
 
-__all__ = ["Input", "Output", "Parameter", "make_input", "make_output", "make_parameter", "text_of"]
+__all__ = ["Input", "Output", "Parameter", "make_input", "make_output", "make_parameter", "number_text", "text_of"]

@@ -242,6 +242,7 @@ class JointMethods:
     joints: dict[str, Joint]
     elements: dict[str, ForceElement | Load]
     constraints: dict[str, str]
+    _take_inputs: Callable[..., None]
 
     @keeps_given
     def joint(
@@ -436,6 +437,7 @@ class JointMethods:
         given = self._prescribed(name, function, level, start, rate, coordinate_term(joint, 1.0), "rad")
         moved = _displacement(name, function, given, "rad")
         row = Row("angle", (Term(terms.ROTATION, joint.i, joint.j),), None, moved)
+        self._take_inputs(moved if given is None else given.function)
         return self._add_joint(name, "rotation", joint.i, joint.j, [row], given)
 
     @keeps_given
@@ -448,6 +450,7 @@ class JointMethods:
         along = Term(terms.DOT2, joint.i, joint.j, Z)
         given = self._prescribed(name, function, level, start, rate, along, "m")
         row = Row("displacement", (along,), _displacement(name, function, given, "m"))
+        self._take_inputs(row.function if given is None else given.function)
         return self._add_joint(name, "translation", joint.i, joint.j, [row], given)
 
     # --- checks -----------------------------------------------------------------------------------

@@ -31,6 +31,20 @@ QUANTITY = re.compile(rf"\s*(?>{NUMBER.pattern})(?:\s*[A-Za-zµμ°]|\s+1\s*/)")
 there."""
 
 
+class NoNumber:
+    """What has a name that expressions calculate with, and no value that Python could."""
+
+    name: str
+
+    def _calculate(self, *_: Any) -> Any:
+        raise ModelError(
+            f"{self.name!r} has a value in the equations alone; calculate in an expression, such as '2*{self.name}'"
+        )
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = _calculate
+    __truediv__ = __rtruediv__ = __pow__ = __rpow__ = __neg__ = __pos__ = __abs__ = __float__ = _calculate
+
+
 def keeps_given(method: F) -> F:
     """Let a method that adds something by name note in ``self.given`` which settings were texts with units."""
     signature = inspect.signature(method)
@@ -88,6 +102,11 @@ def quantity(value: Any, unit: str, field: str, factor: float = 1.0) -> float:
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
+    if isinstance(value, NoNumber):
+        raise ModelError(
+            f"{field}: {value!r} has a value in the equations alone; give a number or a text with a unit, and let it "
+            f"stand in an expression, such as '2*{value.name}'. Numbers of elements are set by names of their own"
+        )
     try:
         number = to_si(value, unit, field)
     except OverflowError:

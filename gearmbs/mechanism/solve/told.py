@@ -24,7 +24,7 @@ AT_AN_INSTANT = (
     "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
     "reaction", "reaction_force", "load", "diagnostics", "contact", "modal_coordinates", "modal_velocities",
     "joint_displacement", "joint_rate", "marker_position", "marker_velocity", "deflection", "state", "multipliers",
-    "kinetic_energy", "constraint_violation", "transmission_error",
+    "kinetic_energy", "constraint_violation", "transmission_error", "unknown",
 )  # fmt: skip
 """What `Solution` tells of one instant alone."""
 COUNTED = ("joint_angle", "evaluate")
@@ -56,7 +56,7 @@ class Point(NamedTuple):
 
 Number = Literal[
     "joint_displacement", "joint_rate", "state", "kinetic_energy", "constraint_violation", "transmission_error",
-    "joint_angle", "evaluate", "input",
+    "unknown", "joint_angle", "evaluate", "input",
 ]  # fmt: skip
 """Quantities that are one number at an instant,"""
 Array = Literal[
@@ -227,6 +227,11 @@ class Told(OwnAttributes):
             own = Rows(*(column[row : row + 1].copy() for column in rows))
             path.append((point.t, own, 0, point.idata))
         return path
+
+    @property
+    def unknowns(self) -> list[str]:
+        """Names of the unknowns of the equations, for ``get("unknown", name)``."""
+        return list(self._problem.names)
 
     @property
     def failed(self) -> bool:

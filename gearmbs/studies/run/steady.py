@@ -208,7 +208,12 @@ def steady_train(
         Where planets come back after more than `LONG` mesh cycles alone, before they are integrated.
     """
     for drive in train.drives:
-        if not isinstance(drive, SpeedDrive) or drive.curve is not None or drive.function is not None:
+        if (
+            not isinstance(drive, SpeedDrive)
+            or drive.curve is not None
+            or drive.function is not None
+            or drive.reference
+        ):
             raise DrivetrainError(
                 f"{drive.label}: does not prescribe a constant speed: the motion has a period of its own; take a "
                 'drive of kind "speed", or run_train'
