@@ -17,6 +17,9 @@ from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, truth
 from gearmbs.wording import warn
 
+OWN_LAWS = ("iso", "iso single", "potential-energy")
+"""Stiffnesses of a mesh that follow from its wheels."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Wheel(Part):
@@ -72,7 +75,8 @@ class GearMesh(Part):
     pair : type, optional
         What is made of the two wheels, ``pair(driver, driven, **settings)``; default `GearPair`.
         `gearmbs.gears.IdealMesh`: one spring along the line of action, ``stiffness`` then of the whole mesh (default
-        c_gamma), ``error`` and ``stiffness_curve`` its own, and ``ideal_backlash`` whether teeth can part.
+        c_gamma), ``damping`` (N s/m, in place of ``damping_ratio``), ``error`` and ``stiffness_curve`` its own, and
+        ``ideal_backlash`` whether teeth can part.
 
     Raises
     ------
@@ -113,6 +117,9 @@ class GearMesh(Part):
                 return _ideal(self.label, kind, driver, driven, {**given, **operation}, own)
             if not (isinstance(kind, type) and issubclass(kind, GearPair)):
                 return kind(driver, driven, **operation, **given, **own)
+            require("damping" not in given,
+                    f"{self.label}: settings has damping, N s/m, which is an ideal mesh's (pair=gm.IdealMesh); give "
+                    "damping_ratio, or a contact law with its own")  # fmt: skip
             if "contact" in given:
                 return kind(driver, driven, **operation, **given)
             with before_own_law():
@@ -135,10 +142,19 @@ def _ideal(
     """
     parting = truth(given.pop("ideal_backlash", False), "ideal_backlash")
     curves = {key: given.pop(key) for key in ("stiffness_curve", "error") if key in given}
+    damping = given.pop("damping", None)
+    require(
+        damping is None or "damping_ratio" not in own,
+        f"{label}: damping is {damping!r} beside damping_ratio, of which it follows; leave one of them out",
+    )
     with before_own_law():
         pair = GearPair(driver, driven, **given)
     stiffness, ratio = own.get("stiffness", "iso"), own.get("damping_ratio")
-    if stiffness not in ("iso", "iso single", "potential-energy"):
+    if damping is not None:
+        if stiffness in OWN_LAWS:
+            stiffness = pair.with_own_stiffness(stiffness).mean_mesh_stiffness
+        return kind(pair, stiffness, damping, backlash=parting, **curves)
+    if stiffness not in OWN_LAWS:
         return kind.with_damping_ratio(pair, stiffness, ratio, backlash=parting, **curves)
     if pair.misalignment:
         warn(

@@ -171,7 +171,8 @@ class ValueMethods:
     def _check_number(self, name: str, what: str) -> None:
         tables: dict[str, Mapping[str, Any]] = {"input": self.inputs, "parameter": self.parameters}
         for title, table in {**tables, "output": self.outputs}.items():
-            if name.upper() in map(str.upper, table):
-                raise ModelError(f"{what} {name!r}: one of its {title}s has the name; choose another")
+            taken = next((one for one in table if one.upper() == name.upper()), None)
+            if taken is not None:
+                raise ModelError(f"{what} {name!r}: one of its {title}s is called {taken!r}; choose another")
         if what != "output" and name in self.aliases:
             raise ModelError(f"{what} {name!r}: {self.aliases[name]!r} goes by that name, too; choose another")

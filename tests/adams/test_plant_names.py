@@ -145,3 +145,21 @@ def test_the_frame_of_a_body_that_deforms_is_left_out_of_a_deck(tmp_path):
     assert f"output 'frame' is left out: output ('angular_velocity', '{bar.name}', 'z'): '{bar.name}' deforms" in text
     assert "output 'seat'" not in text
     assert "POUTPUT" in text
+
+
+def test_forces_among_outputs_of_a_deck_are_told_by_its_mechanism():
+    """A reaction and the force of an element stand there by their ids, which the mechanism knows by names."""
+    m = gm.Mechanism("pendulum", gravity=(0, 0, -9.81))
+    rod = m.body("rod", mass=1.0, inertia=(0.1, 0.2, 0.2), position=(0.3, 0, 0))
+    m.revolute("pin", rod, m.ground, at=(0, 0, 0), axis=(0, 1, 0))
+    m.spring_damper("spring", rod.marker(name="tip"), m.ground.marker((0.3, 0, 1.0), name="hook"), stiffness=20.0)
+    m.output("carried", ("reaction", "pin", "fz"))
+    m.output("pulled", ("load", "spring", "fz"))
+    again = build_mechanism(parse_deck(gm.write_deck(m)))
+    sims = [gm.Simulator(one, 0.2, tol=1e-8) for one in (m, again)]
+    for sim in sims:
+        sim.advance(0.1)
+    for name in ("carried", "pulled"):
+        one, other = (sim.get("output", name) for sim in sims)
+        assert other == pytest.approx(one, rel=1e-6)
+        assert abs(one) > 0.1

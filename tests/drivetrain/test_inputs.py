@@ -14,7 +14,9 @@ from gearmbs.drivetrain import (
     SpeedDrive,
     TorqueLoad,
 )
+from gearmbs.gears import IdealMesh
 from gearmbs.mechanism import make_input
+from tests.drivetrain.support import stage
 from tests.says import says
 
 STIFFNESS, DAMPING = 4000.0, 2.0
@@ -134,3 +136,21 @@ def test_a_prescribed_speed_is_an_input():
     ):
         with pytest.raises((DrivetrainError, gm.mechanism.ModelError), match=words):
             mill(SpeedDrive(name="motor", shaft="motor shaft", speed="100 rad/s", **more)).build()
+
+
+def test_an_ideal_mesh_has_the_damping_that_is_given():
+    def settings(**given):
+        return stage().changed("mesh", pair=IdealMesh, settings={"stiffness": "2e8 N/m", **given})
+
+    mesh = settings(damping="800 N s/m").pairs["mesh"]
+    assert (mesh.stiffness, mesh.damping) == (2e8, 800.0)
+    assert stage().changed("mesh", pair=IdealMesh, settings={"damping": 500.0}).pairs["mesh"].damping == 500.0
+    with pytest.raises(DrivetrainError, match=says("'mesh'", "damping_ratio", "800 N s/m")):
+        settings(damping="800 N s/m", damping_ratio=0.1).pairs  # noqa: B018
+    with pytest.raises(DrivetrainError, match=says("'mesh'", "damping_ratio", "IdealMesh")):
+        stage().changed("mesh", settings={"damping": 800.0}).pairs  # noqa: B018
+
+
+def test_a_deck_is_written_of_what_a_drivetrain_builds():
+    with pytest.raises(gm.mechanism.ModelError, match=says("Drivetrain", "build()")):
+        gm.write_deck(stage())

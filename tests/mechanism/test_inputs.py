@@ -139,7 +139,11 @@ def test_inputs_and_parameters_stand_in_forces_as_they_are():
         (lambda m, d, p: m.torque("t", d, m.parameter("k", "N m", 1.0)), ("'t'", "'2*k'")),
         (lambda m, d, p: m.torque("t", d, lambda t: 3.0), ("'t'", "m.function", "F(TIME)")),
         (lambda m, d, p: m.rotation("r", p, lambda t: 3.0), ("'r'", "m.function", "F(TIME)")),
-        (lambda m, d, p: (m.parameter("u", "N m", 1.0), m.torque("t", d, make_input("u", "N m"))), ("'u'", "parameters")),
+        (lambda m, d, p: (m.parameter("u", "N", 1.0), m.torque("t", d, make_input("u", "N m"))), ("'u'", "parameters")),
+        (lambda m, d, p: m.output("o", ("reaction", "pin", "q")), ("'o'", "'q'", "'fx'", "'tz'")),
+        (lambda m, d, p: m.output("o", ("angular_velocity", "disc", "tz")), ("'o'", "'tz'", "'x', 'y' or 'z'")),
+        (lambda m, d, p: m.output("o", ("kinetic_energy", "disc")), ("'o'", "'disc'", "leave")),
+        (lambda m, d, p: m.output("o", ("joint_angle",)), ("'o'", "'joint_angle'", "joint")),
     ],
 )
 def test_what_stands_where_it_cannot_is_said_in_a_line(call, words):
@@ -159,3 +163,10 @@ def test_functions_of_python_are_torques_and_motions_by_a_name():
     solution = m.simulate(1.0, tol=1e-8)
     assert solution.angular_velocity("disc")[-1, 2] == pytest.approx(0.75, abs=1e-6)
     assert solution.joint_angle("its pin")[-1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_name_that_is_a_list_is_none_of_an_output():
+    m, _, _ = disc()
+    m.output("speed", ("angular_velocity", "disc", "z"))
+    with pytest.raises(KeyError, match=says("['speed']", "the outputs are speed")):
+        gm.Simulator(m, 1.0).get("output", ["speed"])

@@ -28,6 +28,7 @@ from gearmbs.adams.builders.scopes import (
     resting_joint,
     sensor_state,
     translated,
+    with_name,
 )
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
@@ -38,8 +39,7 @@ from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.equations.rotation import matrix_from_euler
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
-from gearmbs.mechanism.language.lowering import ELEMENT_FORCES
-from gearmbs.mechanism.language.syntax import Call, Name, Node, Number
+from gearmbs.mechanism.language.syntax import Call, Node
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.curves import add_curve
 from gearmbs.mechanism.parts.elements import State
@@ -206,17 +206,7 @@ class Builder:
         """Return an expression with element ids replaced by the mechanism's names."""
 
         def rename(call: Call) -> Node:
-            if call.name in FUNCTIONS:
-                return self.accelerations.call(call)
-            kind = ELEMENT_FORCES.get(call.name)
-            first = call.args[0] if call.args else None
-            if kind is None or not isinstance(first, Number) or first.integer is None:
-                return call
-            name = self.model.names.get((kind, first.integer))
-            if name is None:
-                # an inactive element exerts nothing
-                return Number(0.0, call.at) if (kind, first.integer) in self.model.pairs else call
-            return replaced(call, args=(Name(name, first.at), *call.args[1:]))
+            return self.accelerations.call(call) if call.name in FUNCTIONS else with_name(self.model, call)
 
         return translated(self.deck, self.present, source, rename)
 

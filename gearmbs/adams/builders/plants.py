@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
-from gearmbs.adams.builders.scopes import AdamsModel
+from gearmbs.adams.builders.scopes import IN_DYNAMICS, AdamsModel, translated, with_name
 from gearmbs.adams.errors import WARNING, Diagnostic
 from gearmbs.adams.parse import statements as st
 from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.language.lowering import ELEMENT_FORCES
 from gearmbs.mechanism.parts.functions import TimeFunction
 from gearmbs.mechanism.parts.inputs import Input
 
 ASKED = re.compile(r"VARVAL\(\s*(\d+)\s*\)", re.IGNORECASE)
 ALONE = re.compile(r"(?:([\d.e+-]+)\*\()?VARVAL\((\d+)\)\)?", re.IGNORECASE)
 """An expression that is a VARIABLE and nothing else, in other units than SI times the SI value of one."""
+FORCES = re.compile(rf"\b(?:{'|'.join(ELEMENT_FORCES)})\s*\(", re.IGNORECASE)
 RATES = {("rotation", "velocity"): "rad/s", ("rotation", "acceleration"): "rad/s^2",
          ("translation", "velocity"): "m/s", ("translation", "acceleration"): "m/s^2"}  # fmt: skip
 """Units of what motions are given by."""
@@ -43,11 +46,21 @@ def name_plants(model: AdamsModel) -> None:
             try:
                 if plant.keyword == "POUTPUT":
                     if name not in m.outputs:
+                        _name_elements(model, variable.id)
                         m.output(name, f"VARVAL({variable.id})")
                 elif name not in m.inputs:
                     _name_input(model, variable, name)
             except ModelError as error:
                 remark(plant, f"{variable.label()} has no name in the mechanism: {error}")
+
+
+def _name_elements(model: AdamsModel, number: int) -> None:
+    """Let what a VARIABLE depends on ask for forces by the names of elements, where no statement has read it so."""
+    m = model.mechanism
+    for one in _seen(model, f"VARVAL({number})"):
+        text = m.variables.get(one)
+        if text is not None and FORCES.search(text) is not None:
+            m.variables[one] = translated(model.deck, IN_DYNAMICS, text, partial(with_name, model))
 
 
 def _name_input(model: AdamsModel, variable: st.Variable, name: str) -> None:

@@ -29,6 +29,7 @@ from gearmbs.adams.parse.deck import Deck, measured_markers
 from gearmbs.dae.equations.expressions import SplineData
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.language.lowering import ELEMENT_FORCES
 from gearmbs.mechanism.language.syntax import Call, Chain, Name, Node, Number, Power, Scope, parse, unparse
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.curves import AXES
@@ -389,6 +390,19 @@ def _curve(deck: Deck, call: Call, numbers: list[int | None]) -> Node:
     value = Call("CUBSPL", (travel, Number(0.0, at, 0), name, Number(float(order), at, order)), at)
     scale = Power(Number(half, at), Number(float(order), at, order), at)
     return Chain(scale, (("*", value),), at)
+
+
+def with_name(model: AdamsModel, call: Call) -> Node:
+    """Return a call that asks for the force of an element by its id with the mechanism's name for it; others as is."""
+    kind = ELEMENT_FORCES.get(call.name)
+    first = call.args[0] if call.args else None
+    if kind is None or not isinstance(first, Number) or first.integer is None:
+        return call
+    name = model.names.get((kind, first.integer))
+    if name is None:
+        # an inactive element exerts nothing
+        return Number(0.0, call.at) if (kind, first.integer) in model.pairs else call
+    return replace(call, args=(Name(name, first.at), *call.args[1:]))
 
 
 def translated(deck: Deck, present: Present, text: str, rename: Callable[[Call], Node] | None = None) -> str:

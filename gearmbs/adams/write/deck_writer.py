@@ -31,6 +31,7 @@ from gearmbs.dae.equations.rotation import euler_from_matrix
 from gearmbs.dae.methods import FORMULATIONS, INTEGRATORS
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism import Mechanism
+from gearmbs.mechanism.checks import check_mechanism
 from gearmbs.mechanism.contacts import SolidContact
 from gearmbs.mechanism.language.lowering import ELEMENT_FORCES
 from gearmbs.mechanism.language.syntax import (
@@ -299,6 +300,7 @@ def write_deck(
     ModelError
         Naming what cannot be written.
     """
+    check_mechanism(mechanism)
     if gears not in ("expressions", "solids"):
         raise ModelError(f"gears = {gears!r}; choose 'expressions' or 'solids'")
     with markers_kept((mechanism.ground, *mechanism.bodies.values())):

@@ -254,7 +254,7 @@ class Measures:
     def named_output(self, name: str) -> Output:
         """Return what an output of the mechanism is by its name."""
         outputs = self.mechanism.outputs
-        if name not in outputs:
+        if not isinstance(name, str) or name not in outputs:
             raise KeyError(f"output {name!r}; the outputs are {', '.join(outputs) or 'none'}")
         return outputs[name]
 

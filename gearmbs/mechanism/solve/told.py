@@ -16,9 +16,10 @@ from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
 from gearmbs.mechanism.parts.bodies import OwnAttributes, markers_kept
-from gearmbs.mechanism.parts.inputs import Output
+from gearmbs.mechanism.parts.inputs import AXES as VECTORS
+from gearmbs.mechanism.parts.inputs import WRENCHES, Output
 from gearmbs.mechanism.solve.settings import Settings
-from gearmbs.wording import did_you_mean
+from gearmbs.wording import any_of, did_you_mean
 
 AT_AN_INSTANT = (
     "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
@@ -31,6 +32,13 @@ COUNTED = ("joint_angle", "evaluate")
 """What it tells with full turns counted from the first point on."""
 OF_PLANTS = ("marker_acceleration",)
 """What a plant alone tells of an output."""
+PAIRED = ("reaction", "load")
+"""What is a force and a torque,"""
+VECTORIAL = (
+    "com_position", "com_velocity", "com_acceleration", "angular_velocity", "angular_acceleration", "reaction_force",
+    "marker_position", "marker_velocity", "marker_acceleration",
+)  # fmt: skip
+"""or one vector, of which an output may be a component."""
 COUNTED_FUNCTION = re.compile(r"\bA[XYZ]\s*\(", re.IGNORECASE)
 """AX, AY and AZ of the function language."""
 
@@ -304,6 +312,18 @@ def check_told(output: Output) -> None:
     if what.startswith("_") or not (what in known or hasattr(Solution, what)):
         hint = did_you_mean(what, known, shown=repr, otherwise=f"there are {', '.join(known)}")
         raise ModelError(f"output {output.name!r}: nothing is called {what!r}; {hint}")
+    method = getattr(Solution, what, None)
+    names = list(signature(method).parameters)[1:] if callable(method) else ["marker"] if what in OF_PLANTS else []
+    given, component = list(output.asked[1:]), output.component
+    if len(given) < len(names):
+        raise ModelError(f"output {output.name!r}: {what!r} is of one {names[0]}; name it")
+    parts: tuple[str, ...] = ()
+    if names:
+        parts = WRENCHES if what in PAIRED else VECTORS if what in VECTORIAL else ()
+    wrong = given[-1] if len(given) > len(names) else component if component not in (None, *parts) else None
+    if wrong is not None:
+        remedy = f"choose {any_of(map(repr, parts))}" if parts else "leave it out"
+        raise ModelError(f"output {output.name!r}: {what!r} has no component {wrong!r}; {remedy}")
 
 
 def _check_names(what: str, found: Any, names: tuple[Any, ...]) -> None:
