@@ -167,6 +167,7 @@ class Restored(Told):
             first, origin = self._own_point(state), (self._problem, self._origin)
             kept = self._points[: first + 1] if first is not None else []
             self._begin_in(state)
+            self._equations = self._equations or equations_of(self._base)
             if state.history is not None and state.is_own and state.history.equations == self._equations:
                 # turns that no point of the solution knows
                 mark: Mark | None = getattr(state.history.numbers, "mark", None)
