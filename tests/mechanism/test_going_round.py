@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
+from gearmbs.drivetrain import RollingContactBearing, Shaft, Wheel
+from gearmbs.gears import GearSpec
 from gearmbs.mechanism import Mechanism
+from tests.drivetrain.support import stage
 
 PERIOD, POINTS = 1e-3, 60
 ANGLES = ("wound", "driven", "free")
@@ -97,3 +100,42 @@ def test_states_go_on_in_any_simulator_whatever_is_set_and_counted(integrator, t
                 else:
                     # turns that nothing in the model counts begin anew
                     np.testing.assert_allclose(found[-4:-2], wanted[later][-4:-2], atol=1e-6)
+
+
+def flexible_train():
+    """A stage whose shafts bend and stand in ball bearings."""
+    shafts = [Shaft(name=name, length="100 mm", radius="15 mm", modes=2) for name in ("in", "out")]
+    bearings = [
+        RollingContactBearing(name=f"{name} {x}", shaft=name, station=1e-3 * x, rolling="6206", settings={})
+        for name in ("in", "out")
+        for x in (20, 80)
+    ]
+    wheels = [
+        Wheel(name=name, shaft=shaft, station="50 mm", gear=GearSpec(teeth, "3 mm", name=name))
+        for name, shaft, teeth in (("pinion", "in", 20), ("gear", "out", 60))
+    ]
+    train = stage(shafts=shafts, bearings=bearings, wheels=wheels, run_up=0.005)
+    return train.build(), {"tol": 1e-5, "rate_scale": train.rate_scale}
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:shaft")
+def test_flexible_shafts_on_rolling_bearings_go_on_bit_for_bit(tmp_path):
+    """Points of one run, back to the middle, and on from a file in a simulator of another mechanism like it."""
+    m, options = flexible_train()
+    times = np.linspace(0.0, 1e-3, 21)
+    one = m.simulate(times[-1], t_eval=times, **options)
+    sim = gm.Simulator(m, times[-1], **options)
+    for t in times[1:11]:
+        sim.advance(t)
+    state = sim.state()
+    read = gm.State.load(state.save(tmp_path / "half.npz"))
+    others = [sim, gm.Simulator(flexible_train()[0], times[-1], initial=read, **options)]
+    for t in times[11:]:
+        sim.advance(t)
+    sim.restore(state)
+    for other in others:
+        for t in times[11:]:
+            other.advance(t)
+        np.testing.assert_array_equal(other.solution().result.y[-10:], one.result.y[11:])
+    np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
