@@ -133,6 +133,7 @@ def linearize(
 ) -> LinearPlant:
     """Return the linear plant of a drivetrain; see :meth:`gearmbs.drivetrain.Drivetrain.linearize`."""
     if isinstance(at, str) and at == "loaded":
+        _check_references(train, inputs)
         m, after = loaded(train)
         at, t = "initial", after if t is None else t
     else:
@@ -141,6 +142,17 @@ def linearize(
     point = point_of(m, at, t)
     named = [_input(train, m, item) for item in inputs]
     return linear_plant(m, named, [_output(train, m, item) for item in outputs], at=point)
+
+
+def _check_references(train: Drivetrain, inputs: Sequence[Any]) -> None:
+    """Raise a DrivetrainError for the speed that a drive is asked for: at rest under load drives hold their torques."""
+    for drive in train.drives:
+        name = getattr(getattr(drive, "reference", None), "name", None)
+        if name is not None and any(getattr(item, "name", item) == name for item in inputs):
+            raise DrivetrainError(
+                f"input {name!r}: at='loaded' {drive.label} holds its torque or rests, whatever speed it is asked for; "
+                "take at='initial', a state or a solution"
+            )
 
 
 def _input(train: Drivetrain, m: Mechanism, item: Any) -> Any:

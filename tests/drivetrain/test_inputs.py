@@ -100,6 +100,8 @@ def test_the_speed_that_a_controlled_drive_is_asked_for_is_an_input_of_its_plant
     ):
         np.testing.assert_allclose(found.frequency_response(f)[0, :, 0], exact, rtol=1e-6)
         assert found.point.inputs == pytest.approx([100.0])
+    with pytest.raises(DrivetrainError, match=says("'wanted'", "'motor'", "at='initial'")):
+        train.linearize(["wanted"], shown)
     sim.set("wanted", 110.0)
     sim.advance(0.9)
     assert sim.get("angular_velocity", "motor shaft")[2] == pytest.approx(110.0, rel=1e-2)
