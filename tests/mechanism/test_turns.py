@@ -291,6 +291,20 @@ def test_joints_that_motions_drive_begin_at_the_turns_of_a_state(kind, opposite)
     np.testing.assert_allclose(found.evaluate(az), angle(found.t), atol=1e-5)
 
 
+def test_motions_of_markers_of_one_name_are_not_taken_for_each_other():
+    """Of two joints whose markers have the same names one is driven; both begin within half a turn."""
+    m = Mechanism("twins")
+    base = m.body("base", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    m.fixed("foot", base, m.ground)
+    for name, speed, on in (("driven", 0.0, m.ground), ("free", 30.0, base)):
+        body = m.body(name, mass=1.0, inertia=(1.0, 1.0, 1.0), angular_velocity=(0, 0, speed))
+        m.joint("revolute", name, body.marker(name="I"), on.marker(name="J"))
+    m.rotation("drive", m.joints["driven"], gm.mechanism.polynomial([20.0, 100.0]))
+    solution = m.simulate(0.2, rate=200)
+    np.testing.assert_allclose(solution.joint_angle("driven"), 20.0 - 6 * np.pi + 100.0 * solution.t, atol=1e-5)
+    np.testing.assert_allclose(solution.joint_angle("free"), 30.0 * solution.t, atol=1e-5)
+
+
 def test_a_speed_that_was_set_goes_on_with_its_turns():
     m, _ = driven("input")
     sim = gm.Simulator(m, t_end=1.0)

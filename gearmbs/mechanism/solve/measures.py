@@ -104,7 +104,13 @@ class Measures:
         if solution.t[0] != solution.problem.t0:
             return known
         for joint in self.mechanism.joints.values():
-            if joint.kind == "rotation" and (joint.i.name, joint.j.name) == (i, j):
+            # a name that two markers have says nothing
+            if (
+                joint.kind == "rotation"
+                and (joint.i.name, joint.j.name) == (i, j)
+                and self._alone(i)
+                and self._alone(j)
+            ):
                 label = f"{joint.name}: {joint.rows[0].label}"
                 if label in system.row_names:
                     angle = self._prescribed(joint, system.row_names.index(label))
@@ -113,6 +119,10 @@ class Measures:
                     # it may hold the axes x opposite, as they were drawn
                     known[0] = angle if turned @ ai[:, 0] > 0.0 else angle - np.pi
         return known
+
+    def _alone(self, name: str) -> bool:
+        bodies = (self.mechanism.ground, *self.mechanism.bodies.values())
+        return sum(marker.name == name for body in bodies for marker in body.markers) == 1
 
     def _prescribed(self, motion: Joint, row: int) -> float:
         """Return the angle that a motion prescribes where the run starts, rad, with what is set in it."""
