@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from numba import float64, int64
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.expressions.evaluate import eval_request
 from gearmbs.dae.integrators.algebraic.between import settle_output
 from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.run_state import STATE_TYPE
@@ -22,11 +21,13 @@ from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, scale_and_choose
 from gearmbs.dae.linalg.pivoting import LINES_TYPE
 from gearmbs.dae.linalg.plan_lists import lists_of_plan
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, factor, solve
+from gearmbs.dae.model.elastic import elastic_frames
 from gearmbs.dae.model.evaluator import evaluate_rows
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.bound import FUNCTIONS_TYPE, NAMES
 from gearmbs.kernels.jit import Kernel
 from gearmbs.kernels.pointers import address, no_events, no_hook
+from gearmbs.mechanism.language.series import evaluate_series
 from gearmbs.mechanism.solve.simulator import Begun
 from gearmbs.native.driver import DRIVER_TYPE, go_to
 from gearmbs.native.pivots import ROOM_TYPE, choose_for_run
@@ -79,7 +80,8 @@ class Kernels:
         self._by_name: dict[str, Any] = {
             **{kernel.__name__: kernel for kernel in BY_ADDRESS},
             "evaluate_rows": evaluate_rows,
-            "eval_request": eval_request,
+            "evaluate_series": evaluate_series,
+            "elastic_frames": elastic_frames,
             "residual": problem.residual,
             "jacobian": problem.jacobian,
             "hook": problem.hook or no_hook,

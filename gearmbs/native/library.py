@@ -142,7 +142,7 @@ def export(
     }
     kernels, m = Kernels(begun), begun.system.mechanism
     with markers_kept((m.ground, *m.bodies.values())):
-        told, left = chosen_outputs(begun.system, begun.problem, list(numbers), outputs)
+        told, left = chosen_outputs(model, begun, list(numbers), outputs)
         names = ["time", *numbers, *(one.name for one in told)]
         for twice in {name for name in names if names.count(name) > 1}:
             raise ModelError(
@@ -259,6 +259,7 @@ def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[T
         "inside": "inside", "functions": "functions", "kernels": "kernels",
         "late_count": "LATE", "late_names": "late_names", "late": "late",
         **memory.structs, **memory.members,
+        "counts": int(any(one.counted.starts for one in told)),
         "numbers": len(numbers), "outputs": len(told), "unknowns": begun.problem.n,
         **{key: key for key in names},
     }  # fmt: skip

@@ -23,10 +23,11 @@ from gearmbs.dae.problem import INPUT, DAEProblem, Number
 from gearmbs.kernels.bound import NAMES
 from gearmbs.kernels.lanes import LANES
 from gearmbs.mechanism.solve.simulator import Begun
+from gearmbs.native.asked import Expressions, expressions_of
 from gearmbs.native.driver import Driver
 from gearmbs.native.image import CONSTANT, SCRATCH, STATE, Image, Layout, member_of, word_of
 from gearmbs.native.kernels import BY_ADDRESS
-from gearmbs.native.outputs import Expressions, Told, expressions_of
+from gearmbs.native.outputs import Told
 from gearmbs.native.pivots import PlanRoom
 from gearmbs.native.teller import Teller
 
@@ -112,10 +113,14 @@ def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], fun
     ones, counted = np.ones(indptr.size - 1), np.zeros(indices.size)
     found = _factored(image, plan, new_factors(plan), indptr, indices, ones, counted, [], False, None)
     kinds = {**dict.fromkeys(_RECORDS, SCRATCH), **dict.fromkeys(_ASKED, CONSTANT)}
+    if not asked.starts.size:
+        # of the point before nothing is asked
+        kinds |= dict.fromkeys(_OF_POINTS, SCRATCH)
     parts["teller"] = image.struct(teller, STATE, kinds)
     image.function_at(parts["teller"], member_of(Teller, "evaluate"), function("evaluate_rows"))
     if asked.bounds.size:
-        image.function_at(parts["teller"], member_of(Teller, "request"), function("eval_request"))
+        for name, kernel in (("series", "evaluate_series"), ("elastic_frames", "elastic_frames")):
+            image.function_at(parts["teller"], member_of(Teller, name), function(kernel))
     parts |= {name: getattr(own, name) for name in own._fields}
     parts |= {f"told_{name}": getattr(found, name) for name in found._fields}
     # kernels of elements stand in the tables of integers
@@ -148,6 +153,7 @@ def _state(begun: Begun) -> RunState:
     y_out, yp_out = np.zeros((ROWS, begun.problem.n)), np.zeros((ROWS, begun.problem.n))
     y_out[0], yp_out[0] = point.y, point.yp
     kept = np.zeros((ROWS, len(st.kept)))
+    kept[0] = point.rows.kept[point.row]
     return st.with_members(
         outputs=np.full(ROWS, np.inf), y_out=y_out, yp_out=yp_out, kept_out=kept, next_output=ROWS, t_pause=np.inf
     )
@@ -282,16 +288,14 @@ _RECORDS = (
     "force",
     "moment",
     "rdata",
-    "kin",
-    "acc",
-    "reference",
+    "grad",
     "tape_work",
-    "tape_y",
 )
 _ASKED = (
     "slots", "turns", "first", "kind", "at", "ints", "floats", "bounds", "own_first", "own_kind", "own_at",
-    "marker_body", "marker_frame",
+    "marker_body", "marker_frame", "elastic", "shapes", "counts", "further",
 )  # fmt: skip
+_OF_POINTS = ("kin", "acc", "tape_y")
 
 
 def _driver(begun: Begun, numbers: Mapping[str, Number]) -> Driver:
@@ -379,10 +383,17 @@ def _teller(begun: Begun, told: list[Told], asked: Expressions) -> tuple[Teller,
         own_at=asked.at,
         marker_body=asked.marker_body,
         marker_frame=asked.marker_frame,
-        kin=np.zeros((asked.frames, KIN_COLUMNS)),
-        acc=np.zeros((asked.frames, 6)),
-        reference=np.zeros(1),
+        elastic=asked.elastic,
+        shapes=asked.shapes,
+        counts=asked.counts,
+        further=asked.further,
+        times=np.zeros(2),
+        kin=np.zeros((2 * asked.frames, KIN_COLUMNS)),
+        acc=np.zeros((2 * asked.frames, 6)),
+        tape_y=np.zeros(2 * (len(asked.first) - 1)),
+        angles=np.concatenate([asked.starts, np.zeros(asked.starts.size)]),
+        known=np.full(2 * asked.starts.size, np.nan),
+        grad=np.zeros(max(1, asked.gradient)),
         tape_work=np.zeros(asked.work),
-        tape_y=np.zeros(max(1, asked.unknowns)),
     )
     return teller, plan, indptr, indices

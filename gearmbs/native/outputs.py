@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,12 +12,14 @@ from gearmbs.dae.equations.accelerations import FORCE_RECORD
 from gearmbs.dae.equations.expressions import ExpressionError
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
-from gearmbs.dae.model.model import Names
-from gearmbs.dae.problem import DAEProblem, ModelError
+from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.bound import NAMES
-from gearmbs.mechanism.compile import scope_of
+from gearmbs.mechanism.compile import scope_of, starting_angles
 from gearmbs.mechanism.language.library import compile_expression
-from gearmbs.native.teller import FORCE, LOADS, MOMENT, NUMBER, POSE, SOLUTION, UNKNOWN
+from gearmbs.mechanism.parts.joints import kinds_with_angle, kinds_with_displacement
+from gearmbs.mechanism.solve.simulator import Begun, Simulator
+from gearmbs.native.asked import Counted
+from gearmbs.native.series import FORCE, LOADS, MOMENT, NUMBER, POSE, SOLUTION, UNKNOWN
 
 AXES = ("x", "y", "z")
 WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
@@ -29,6 +31,10 @@ OF_BODY = {
     "angular_acceleration": (SOLUTION, 3, "rad/s^2"),
 }
 """Quantities of bodies with three components: the record, the first place in that of a body, and the unit."""
+MODAL = {"modal_coordinates": (0, "1"), "modal_velocities": (1, "1/s")}
+"""Quantities of bodies that deform, by the number of a mode."""
+OF_JOINT = ("joint_angle", "joint_displacement", "joint_rate")
+"""Quantities of joints that are told as expressions."""
 
 
 class Told(NamedTuple):
@@ -43,6 +49,8 @@ class Told(NamedTuple):
         An expression instead of a sum.
     entries : tuple of tuple of (int, int)
         Of each unknown of the expression the numbers that add up to it.
+    counted : Counted
+        Its counted angles.
     """
 
     name: str
@@ -50,6 +58,7 @@ class Told(NamedTuple):
     places: tuple[tuple[int, int], ...]
     tape: Tape | None = None
     entries: tuple[tuple[tuple[int, int], ...], ...] = ()
+    counted: Counted = Counted()
 
 
 class Finder:
@@ -57,14 +66,18 @@ class Finder:
 
     Parameters
     ----------
-    system : System
-    problem : DAEProblem
+    simulator : Simulator
+        What is exported.
+    begun : Begun
+        What stands behind it.
     numbers : sequence of str
         What can be set.
     """
 
-    def __init__(self, system: Any, problem: DAEProblem, numbers: Sequence[str]) -> None:
-        self.model, self.problem, self.states = system.model, problem, list(system.state_names)
+    def __init__(self, simulator: Simulator, begun: Begun, numbers: Sequence[str]) -> None:
+        system, self.problem = begun.system, begun.problem
+        self.simulator, self.t = simulator, begun.point.t
+        self.model, self.states = system.model, list(system.state_names)
         self.mechanism, self.numbers = system.mechanism, list(numbers)
         self.most = max((len(d) for d in self.model.diagnostics), default=0)
 
@@ -109,30 +122,79 @@ class Finder:
                 told = self.model.diagnostics[k]
                 c = self._index([d.name for d in told], quantity, f"diagnostic of {element}")
                 return Told(name, told[c].unit, ((LOADS, k * self.columns + FORCE_RECORD + c),))
+            if what in MODAL:
+                body, mode = rest
+                return Told(name, MODAL[what][1], ((POSE, self._modal_place(body, int(mode), MODAL[what][0])),))
+            if what in OF_JOINT:
+                (joint,) = rest
+                return self._of_joint(name, what, joint)
             if what == "state":
                 (state,) = rest
                 return Told(name, "1", ((UNKNOWN, int(self.problem.idata[T.H_Z]) + self.states.index(state)),))
         except (ValueError, TypeError) as error:
             raise ModelError(f"output {name!r}: {tuple(asked)!r} cannot be told: {error}") from None
-        known = ", ".join([*OF_BODY, "orientation", "reaction", "reaction_force", "load", "diagnostics", "state"])
+        others = ("orientation", "reaction", "reaction_force", "load", "diagnostics", "state")
+        known = ", ".join([*OF_BODY, *MODAL, *OF_JOINT, *others])
         raise ModelError(f"output {name!r}: a library does not tell {what!r}; it tells {known}")
 
     def evaluate(self, name: str, text: str) -> Told:
         """Return an output that is an expression; refused as `find` does."""
-        scope, _, _ = scope_of(self.mechanism)
+        scope, _, marker_named = scope_of(self.mechanism)
         try:
             tape = compile_expression(text, scope, accelerations=True)
             entries = tuple(self._unknown(name, key) for key in tape.algebraic)
+            counted = self._counted(text, tape, marker_named) if tape.n_angles else Counted()
         except (ExpressionError, ValueError) as error:
             raise ModelError(f"output {name!r}: {text!r} cannot be told: {error}") from None
-        held = [
-            *(["angles that are counted"] if tape.n_angles else []),
-            *(["frames of bodies that deform"] if max(tape.bodies, default=0) > len(self.model.names.bodies) else []),
-            *(["functions of Python"] if np.isin(tape.ints, np.fromiter(NAMES, dtype=np.int64)).any() else []),
-        ]
-        if held:
-            raise ModelError(f"output {name!r}: a library does not tell {text!r}: it depends on {', '.join(held)}")
-        return Told(name, "", (), tape.bind(tape.algebraic.index), entries)
+        if np.isin(tape.ints, np.fromiter(NAMES, dtype=np.int64)).any():
+            raise ModelError(f"output {name!r}: a library does not tell {text!r}: it depends on functions of Python")
+        return Told(name, "", (), tape.bind(tape.algebraic.index), entries, counted)
+
+    def _counted(self, text: str, tape: Tape, marker_named: Callable[[int], str]) -> Counted:
+        """Return the counted angles of an expression, as `gearmbs.mechanism.solve.measures` counts them."""
+        turns, problem = self.mechanism.turns, self.problem
+        starts = starting_angles(tape, turns, marker_named)
+        if self.t != problem.t0:
+            starts = self.mechanism.measures(self.simulator.solution()).counted_expression(text, None)[1].tolist()
+        places: list[int] = []
+        further: list[float] = []
+        known = problem.counted
+        for function, i, j in tape.angles:
+            named = function, marker_named(i), marker_named(j)
+            if known is None or named not in known.angles:
+                places += (-1, -1, -1)
+                further.append(0.0)
+                continue
+            a, k = len(known.angles), known.angles.index(named)
+            places += (0, 1 + k, 1 + a + k)
+            first = known.values(np.array([problem.t0]), problem.rdata[known.places][None, :])[0, k]
+            further.append(2.0 * np.pi * np.round((turns[named] - first) / (2.0 * np.pi)) if named in turns else 0.0)
+        return Counted(tuple(starts), tuple(places), tuple(further))
+
+    def _of_joint(self, name: str, what: str, joint: str) -> Told:
+        """Return the angle, displacement or rate of a joint, which are those of its markers."""
+        if joint not in self.mechanism.joints:
+            raise ValueError(f"there is no joint {joint!r}; there are {', '.join(self.mechanism.joints) or 'none'}")
+        found = self.mechanism.joints[joint]
+        turns = found.kind in kinds_with_angle()
+        if not (turns if what == "joint_angle" else found.kind in kinds_with_displacement() or what == "joint_rate"):
+            raise ValueError(f"joint {joint!r} is {found.kind}")
+        i, j = found.i.name, found.j.name
+        text, unit = {
+            "joint_angle": (f"AZ({i}, {j})", "rad"),
+            "joint_displacement": (f"DZ({i}, {j}, {j})", "m"),
+            "joint_rate": (f"WZ({i}, {j}, {j})", "rad/s") if turns else (f"VZ({i}, {j}, {j}, {j})", "m/s"),
+        }[what]
+        return self.evaluate(name, text)._replace(unit=unit)
+
+    def _modal_place(self, body: str, mode: int, derivative: int) -> int:
+        """Return where a modal coordinate or its rate stands behind the poses of all bodies."""
+        names, modes = self.model.names.bodies, self.model.modes
+        known = {one.upper(): one for one in names}
+        number = self._index(names, known.get(body.upper(), body), "body") + 1
+        if not 0 <= mode < modes[number]:
+            raise ValueError(f"body {body!r} has {modes[number]} modes, counted from 0; there is no {mode}")
+        return POSE_COLUMNS * len(names) + derivative * sum(modes) + sum(modes[:number]) + mode
 
     def _unknown(self, name: str, key: tuple) -> tuple[tuple[int, int], ...]:
         """Return the numbers that add up to an unknown of an expression, see `gearmbs.mechanism.solve.measures`."""
@@ -142,10 +204,12 @@ class Finder:
             return self.find(name, ("state", known[str(ref).upper()])).places
         if kind == "number":
             return ((NUMBER, self.numbers.index(str(ref))),)
+        if kind in ("mode", "mode1"):
+            return ((POSE, self._modal_place(str(ref), int(rest[0]), int(kind == "mode1"))),)
         of_joint = kind in ("joint", "jprim", "motion", "coupler", "gear", "gcon")
-        owners = self.model.rows_of_joint if of_joint or kind in ("mode", "mode1") else self.model.names.forces
+        owners = self.model.rows_of_joint if of_joint else self.model.names.forces
         known = {owner.upper(): owner for owner in owners}
-        if kind in ("mode", "mode1") or str(ref).upper() not in known:
+        if str(ref).upper() not in known:
             raise ValueError(f"it depends on {kind} {ref}")
         what = "reaction" if of_joint else "load"
         return self.find(name, (what, known[str(ref).upper()], WRENCH[int(rest[0])])).places
@@ -164,11 +228,12 @@ class Finder:
         return list(names).index(name)
 
     def everything(self) -> list[Told]:
-        """Return motions of all bodies, loads and diagnostics of all elements, reactions of all joints, all states."""
+        """Return motions and modes of all bodies, loads and diagnostics of all elements, reactions and states."""
         names = self.model.names
         asked: list[tuple[str, ...]] = []
-        for body in names.bodies:
+        for k, body in enumerate(names.bodies, start=1):
             asked += [(what, body, axis) for what in OF_BODY for axis in AXES]
+            asked += [(what, body, str(mode)) for what in MODAL for mode in range(self.model.modes[k])]
         for k, element in enumerate(names.forces):
             asked += [("load", element, component) for component in WRENCH]
             asked += [("diagnostics", element, d.name) for d in self.model.diagnostics[k]]
@@ -185,13 +250,13 @@ def _component(names: Sequence[str], component: Any) -> int:
 
 
 def chosen_outputs(
-    system: Any, problem: DAEProblem, numbers: Sequence[str], outputs: Sequence[Any] | None
+    simulator: Simulator, begun: Begun, numbers: Sequence[str], outputs: Sequence[Any] | None
 ) -> tuple[list[Told], list[str]]:
     """Return the outputs of an export, and the names of those of the mechanism that are left out.
 
     Parameters
     ----------
-    system, problem, numbers
+    simulator, begun, numbers
         As of `Finder`.
     outputs : sequence, optional
         Names of outputs of the mechanism, and quantities as `Mechanism.output` takes them. Default: all outputs of the
@@ -202,7 +267,7 @@ def chosen_outputs(
     ModelError
         For one that is asked for and cannot be told.
     """
-    finder, named, left = Finder(system, problem, numbers), system.mechanism.outputs, []
+    finder, named, left = Finder(simulator, begun, numbers), begun.system.mechanism.outputs, []
     if outputs is None and not named:
         return finder.everything(), []
     for name in named if outputs is None else outputs:
@@ -231,64 +296,3 @@ def _asked(finder: Finder, named: Any, item: Any) -> Told:
     if made.text is not None:
         return finder.evaluate(item, made.text)
     return finder.find(item, made.what)
-
-
-class Expressions(NamedTuple):
-    """The expressions among the outputs of a model, one after the other, and what they look at.
-
-    Attributes
-    ----------
-    ints, floats : ndarray
-        Tables of all tapes.
-    bounds : ndarray of int64, shape (5 expressions,)
-        Of each its output, where its tables begin in both, where its unknowns begin in ``first``, and their number.
-    first : ndarray of int64
-        Where the numbers that add up to each unknown begin in ``kind`` and ``at``, and where the last ends.
-    kind, at : ndarray of int64
-        As of `gearmbs.native.teller.Teller`.
-    marker_body, marker_frame : ndarray, shapes (markers,) and (markers, 12)
-    work, unknowns, frames : int
-        Scratch and unknowns that suffice for each; rows of the table of frames.
-    """
-
-    ints: np.ndarray
-    floats: np.ndarray
-    bounds: np.ndarray
-    first: np.ndarray
-    kind: np.ndarray
-    at: np.ndarray
-    marker_body: np.ndarray
-    marker_frame: np.ndarray
-    work: int
-    unknowns: int
-    frames: int
-
-
-def expressions_of(system: Any, told: Sequence[Told]) -> Expressions:
-    """Return the expressions among some outputs; with markers that they have made."""
-    tapes = [(k, one.tape, one.entries) for k, one in enumerate(told) if one.tape is not None]
-    bounds: list[int] = []
-    places: list[tuple[int, int]] = []
-    first, ints, floats = [0], 0, 0
-    for k, tape, entries in tapes:
-        bounds += [k, ints, floats, len(first) - 1, len(entries)]
-        ints, floats = ints + tape.ints.size, floats + tape.floats.size
-        for entry in entries:
-            places += entry
-            first.append(len(places))
-    _, builder, _ = scope_of(system.mechanism)
-    frames = np.array([np.ravel(m) for m in builder.marker_frame], dtype=float).reshape(-1, 12)
-    model = builder.build(Names())
-    return Expressions(
-        np.concatenate([np.zeros(0, dtype=np.int64), *(tape.ints for _, tape, _ in tapes)]).astype(np.int64),
-        np.concatenate([np.zeros(0), *(tape.floats for _, tape, _ in tapes)]),
-        np.array(bounds, dtype=np.int64),
-        np.array(first, dtype=np.int64),
-        np.array([kind for kind, _ in places], dtype=np.int64),
-        np.array([at for _, at in places], dtype=np.int64),
-        np.array(builder.marker_body, dtype=np.int64),
-        frames,
-        max((tape.work_size for _, tape, _ in tapes), default=0),
-        max((len(entries) for *_, entries in tapes), default=0),
-        1 + len(system.model.names.bodies) + len(model.frame_body),
-    )

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.expressions.opcodes import KIN_A, KIN_R, KIN_V, KIN_W
-from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.linalg.entry_lists import FEWEST_ENTRIES, LEAVING_PLANS, NEGLIGIBLE
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT
 from gearmbs.dae.model.evaluator import GENERIC_TURNS, evaluate_rows
@@ -15,24 +12,15 @@ from gearmbs.dae.model.records import Records
 from gearmbs.dae.result import Status
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import caller
-from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector, matrix_at, vector_at
+from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector, matrix_at
 from gearmbs.native.pivots import CHOSEN, LEFT_SRC, factor_at, write_plan
-from gearmbs.native.setting import value_of
-
-_VEC, _MAT, _INTS = float64[::1], float64[:, ::1], int64[::1]
-REQUEST = float64(_INTS, _VEC, float64, _MAT, _MAT, _INTS, _MAT, _VEC, _VEC, _VEC)
-"""Signature of `gearmbs.dae.equations.expressions.evaluate.eval_request`."""
+from gearmbs.native.series import number_of, tell_expressions
 
 SINGULAR = int(Status.SINGULAR_JACOBIAN)
 evaluate_at = caller(evaluate_rows.declared)
-request_at = caller(REQUEST)
 
-REQUEST_COLUMNS = 5
-"""Numbers that say where an expression stands, see `gearmbs.native.outputs.Expressions`."""
 TOLD = 1
 """The outputs have been written."""
-UNKNOWN, POSE, SOLUTION, LOADS, FORCE, MOMENT, NUMBER = range(7)
-"""Where a number of an output stands: among the unknowns, in which of the records, among what can be set."""
 
 
 class Teller(Struct):
@@ -53,16 +41,24 @@ class Teller(Struct):
     kind, at : ndarray of int64
         Which record, and where in it.
     out : ndarray, shape (outputs,)
-    ints, floats, bounds, marker_body, marker_frame : ndarray
-        Of `gearmbs.native.outputs.Expressions`.
+    ints, floats, bounds, marker_body, marker_frame, elastic, shapes, counts, further : ndarray
+        Of `gearmbs.native.asked.Expressions`.
     own_first, own_kind, own_at : ndarray of int64
         Its ``first``, ``kind`` and ``at``.
-    kin, acc, reference, tape_work, tape_y : ndarray
-        Scratch: motions and accelerations of frames, and what expressions are evaluated with.
+    times : ndarray, shape (2,)
+        The point that was left last, and the one that was told last.
+    kin, acc : ndarray, shapes (2 frames, KIN_COLUMNS) and (2 frames, 6)
+        Motions and accelerations of frames there.
+    tape_y, angles, known : ndarray
+        Unknowns of expressions there, one after the other; counted angles, and what the run has counted of them.
+    grad, tape_work : ndarray
+        Scratch of expressions.
     """
 
     evaluate: int  # address of `evaluate_rows`, which is compiled apart
-    request: int  # of `eval_request`
+    series: int  # of `evaluate_series`
+    elastic_frames: int
+    points: int  # how many of two points of expressions are known
     ready: bool  # whether there are pivots
     attempt: int  # of evaluating one instant, which may each need others
     plans: int
@@ -93,11 +89,18 @@ class Teller(Struct):
     own_at: IntVector
     marker_body: IntVector
     marker_frame: Matrix
+    elastic: IntVector
+    shapes: Vector
+    counts: IntVector
+    further: Vector
+    times: Vector
     kin: Matrix
     acc: Matrix
-    reference: Vector
-    tape_work: Vector
     tape_y: Vector
+    angles: Vector
+    known: Vector
+    grad: Vector
+    tape_work: Vector
 
 
 TELLER_TYPE = Teller.numba_type
@@ -116,57 +119,6 @@ def _records(q):
 def _table(d):
     """Return the table of integers that is valid for the present point."""
     return d.table_before if d.before else d.table
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _number(st, d, q, kind, at):
-    """Return a number of an output."""
-    if kind == UNKNOWN:
-        return st.y_out[d.present, at]
-    if kind == POSE:
-        return q.pose[0, at]
-    if kind == SOLUTION:
-        return q.solution[0, at]
-    if kind == LOADS:
-        return q.loads[at]
-    if kind == FORCE:
-        return q.force[at]
-    if kind == MOMENT:
-        return q.moment[at]
-    return value_of(d, d.held, at)
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _write_frames(q):
-    """Write the motion and acceleration of the ground and of all bodies, as `gearmbs.dae.results.frames` does."""
-    for k in range(3):
-        q.kin[0, KIN_A + 4 * k] = 1.0
-    bodies = (q.pose.shape[1] - 2 * (q.solution.shape[1] - q.phi.shape[1] // 3)) // 6
-    for b in range(bodies):
-        row, pose = q.kin[1 + b], POSE_COLUMNS * b
-        for k in range(3):
-            row[KIN_R + k] = q.pose[0, pose + POSE_R + k]
-            row[KIN_V + k] = q.pose[0, pose + POSE_V + k]
-            row[KIN_W + k] = q.pose[0, pose + POSE_W + k]
-        for k in range(9):
-            row[KIN_A + k] = q.pose[0, pose + POSE_A + k]
-        for k in range(6):
-            q.acc[1 + b, k] = q.solution[0, 6 * b + k]
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _tell_expression(st, d, q, e):
-    """Write an output that is an expression; ``e`` is where it begins in ``q.bounds``."""
-    first, count = q.bounds[e + 3], q.bounds[e + 4]
-    for a in range(count):
-        q.tape_y[a] = 0.0
-        for p in range(q.own_first[first + a], q.own_first[first + a + 1]):
-            q.tape_y[a] += _number(st, d, q, q.own_kind[p], q.own_at[p])
-    ints, floats = q.bounds[e + 1], q.bounds[e + 2]
-    q.out[q.bounds[e]] = request_at(q.request)(
-        vector_at(q.ints, ints, q.ints.shape[0] - ints), vector_at(q.floats, floats, q.floats.shape[0] - floats), d.t,
-        q.kin, q.acc, q.marker_body, q.marker_frame, q.tape_y, q.reference, q.tape_work,
-    )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -209,11 +161,9 @@ def tell(st, d, q, plan, factors, first):
     for k in range(q.out.shape[0]):
         q.out[k] = 0.0
         for p in range(q.first[k], q.first[k + 1]):
-            q.out[k] += _number(st, d, q, q.kind[p], q.at[p])
+            q.out[k] += number_of(st, d, q, q.kind[p], q.at[p])
     if q.bounds.shape[0] > 0:
-        _write_frames(q)
-        for e in range(q.bounds.shape[0] // REQUEST_COLUMNS):
-            _tell_expression(st, d, q, REQUEST_COLUMNS * e)
+        tell_expressions(st, d, q)
     return TOLD
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from gearmbs.dae.equations import layout as T
-from gearmbs.dae.equations.expressions.opcodes import ACC_A, ACC_ALPHA
 from gearmbs.dae.equations.rotation import KIN_A, KIN_AXES, KIN_R, KIN_V, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
+from gearmbs.dae.model.elastic import elastic_frames
 from gearmbs.dae.model.evaluator import Records
 from gearmbs.dae.model.model import Model
 from gearmbs.dae.model.system import turns_of_one
@@ -96,47 +96,18 @@ def elastic_motion(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return motion (m, 27) and accelerations (m, 6) of an elastic frame from those of its body.
 
-    The equations are those of `gearmbs.dae.equations.bodies.frames`.
-
     Parameters
     ----------
     kin, acc : ndarray, shapes (m, 27), (m, 6)
         Of the body; without accelerations those returned are meaningless.
-    modal : ndarray, shape (3, m, n)
-        q_f, v_f and their accelerations.
-    s0 : ndarray, shape (3,)
-        Place of the frame in the undeformed body, from the centre of mass.
-    phi, psi : ndarray, shape (n, 3)
-        Displacements and rotations of the frame by the modes.
+    modal, s0, phi, psi : ndarray
+        As of `gearmbs.dae.model.elastic.elastic_frames`.
     """
-    from scipy.spatial.transform import Rotation
-
-    q, v, a = modal
     acc = np.zeros((len(kin), ACC_PLACES)) if acc is None else acc
-    axes = kin[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
-    w, alpha = kin[:, KIN_W : KIN_W + 3], acc[:, ACC_ALPHA : ACC_ALPHA + 3]
-
-    def to_global(local: np.ndarray) -> np.ndarray:
-        return np.einsum("tij,tj->ti", axes, local)
-
-    arm, rate, push = to_global(s0 + q @ phi), to_global(v @ phi), to_global(a @ phi)
-    spin = np.cross(w, arm)
-    frame, accelerations = np.zeros_like(kin), np.zeros_like(acc)
-    frame[:, KIN_R : KIN_R + 3] = kin[:, KIN_R : KIN_R + 3] + arm
-    frame[:, KIN_V : KIN_V + 3] = kin[:, KIN_V : KIN_V + 3] + spin + rate
-    accelerations[:, ACC_A : ACC_A + 3] = (
-        acc[:, ACC_A : ACC_A + 3] + np.cross(alpha, arm) + np.cross(w, spin + 2.0 * rate) + push
-    )
-    turned, spun, spun_up = Rotation.from_matrix(axes), w.copy(), alpha.copy()
-    turns, rates, pushes = q @ psi, v @ psi, a @ psi
-    for c in range(3):
-        axis = turned.apply(np.eye(3)[c])
-        spun_up += axis * pushes[:, c : c + 1] + np.cross(spun, axis) * rates[:, c : c + 1]
-        spun += axis * rates[:, c : c + 1]
-        turned = turned * Rotation.from_rotvec(np.outer(turns[:, c], np.eye(3)[c]))
-    frame[:, KIN_A : KIN_A + 9] = turned.as_matrix().reshape(-1, 9)
-    frame[:, KIN_W : KIN_W + 3] = spun
-    accelerations[:, ACC_ALPHA : ACC_ALPHA + 3] = spun_up
+    frame, accelerations = np.zeros(kin.shape), np.zeros(acc.shape)
+    # copies: models are read-only
+    tables = (np.array(table, dtype=float, order="C") for table in (kin, acc, modal, s0, phi, psi))
+    elastic_frames(*tables, frame, accelerations)
     return frame, accelerations
 
 

@@ -156,22 +156,14 @@ static int go(gearmbs_instance *i, double t) {
     }
 }
 
-int gearmbs_advance(gearmbs_instance *instance, double time) {
-    if (instance->failure != GEARMBS_OK) return instance->failure;
-    if (!(time >= gearmbs_time(instance) && time <= model->t_end)) return GEARMBS_REFUSED;
-    if (time == gearmbs_time(instance)) return GEARMBS_OK;
-    if (apply(instance, 0) == GEARMBS_OK) instance->failure = go(instance, time);
-    return instance->failure;
-}
-
-int gearmbs_get(gearmbs_instance *i, double *outputs) {
+/* Evaluate what is told at the present point. */
+static int look(gearmbs_instance *i) {
     void *error = NULL, *run = at(i, model->run), *driver = at(i, model->driver), *teller = at(i, model->teller);
     void *plan = at(i, model->told_plan), *factors = at(i, model->told_factors);
     int64_t code;
-    if (i->failure != GEARMBS_OK) return i->failure;
     for (int64_t first = 1;; first = 0) {
         if (gearmbs_tell(&code, &error, run, driver, teller, plan, factors, first)) return GEARMBS_KERNEL_FAILED;
-        if (code == TOLD) break;
+        if (code == TOLD) return GEARMBS_OK;
         if (gearmbs_choose_for_outputs(&code, &error, run, driver, teller, at(i, model->told_room),
                                        at(i, model->told_columns), at(i, model->told_rows), plan, factors))
             return GEARMBS_KERNEL_FAILED;
@@ -179,8 +171,23 @@ int gearmbs_get(gearmbs_instance *i, double *outputs) {
         if (gearmbs_factor_for_outputs(&code, &error, driver, teller, plan, factors))
             return GEARMBS_KERNEL_FAILED;
     }
-    memcpy(outputs, at(i, model->out), 8 * gearmbs_outputs());
-    return GEARMBS_OK;
+}
+
+int gearmbs_advance(gearmbs_instance *instance, double time) {
+    if (instance->failure != GEARMBS_OK) return instance->failure;
+    if (!(time >= gearmbs_time(instance) && time <= model->t_end)) return GEARMBS_REFUSED;
+    if (time == gearmbs_time(instance)) return GEARMBS_OK;
+    /* angles are counted from the point that is left */
+    if (model->counts) instance->failure = look(instance);
+    if (apply(instance, 0) == GEARMBS_OK) instance->failure = go(instance, time);
+    return instance->failure;
+}
+
+int gearmbs_get(gearmbs_instance *instance, double *outputs) {
+    if (instance->failure != GEARMBS_OK) return instance->failure;
+    int code = look(instance);
+    if (code == GEARMBS_OK) memcpy(outputs, at(instance, model->out), 8 * gearmbs_outputs());
+    return code;
 }
 
 int gearmbs_get_unknowns(const gearmbs_instance *instance, double *values, double *rates) {

@@ -23,6 +23,7 @@ typedef struct {
     int64_t teller, told_plan, told_factors, told_room, told_columns, told_rows;
     /* offsets of single members and arrays */
     int64_t time, present, steps, waiting, wanted, values, rates, out;
+    int64_t counts;                            /* whether outputs count angles from point to point */
     int64_t numbers, outputs, unknowns;
     const char *const *number_names, *const *number_units;
     const char *const *output_names, *const *output_units;
