@@ -1,9 +1,9 @@
-"""Tables of the outputs that are expressions, for `gearmbs.native.series`."""
+"""Outputs of an exported model, and tables of those that are expressions, for `gearmbs.native.series`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,9 +11,6 @@ from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.dae.model.model import Names
 from gearmbs.mechanism.compile import scope_of
 from gearmbs.native.series import KNOWN
-
-if TYPE_CHECKING:
-    from gearmbs.native.outputs import Told
 
 
 class Counted(NamedTuple):
@@ -33,6 +30,30 @@ class Counted(NamedTuple):
     starts: tuple[float, ...] = ()
     places: tuple[int, ...] = ()
     further: tuple[float, ...] = ()
+
+
+class Told(NamedTuple):
+    """An output.
+
+    Attributes
+    ----------
+    name, unit : str
+    places : tuple of (int, int)
+        Records, and places in them, of the numbers that add up to it.
+    tape : Tape, optional
+        An expression instead of a sum.
+    entries : tuple of tuple of (int, int)
+        Of each unknown of the expression the numbers that add up to it.
+    counted : Counted
+        Its counted angles.
+    """
+
+    name: str
+    unit: str
+    places: tuple[tuple[int, int], ...]
+    tape: Tape | None = None
+    entries: tuple[tuple[tuple[int, int], ...], ...] = ()
+    counted: Counted = Counted()
 
 
 class Expressions(NamedTuple):

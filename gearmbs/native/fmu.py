@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as xml
 
+import numpy as np
+
 from gearmbs.files import whole_file
-from gearmbs.native.outputs import Told
+from gearmbs.native.asked import Told
 from gearmbs.units import powers_of
 
 PLATFORMS = {"2.0": "linux64", "3.0": "x86_64-linux"}
@@ -20,6 +22,8 @@ ABILITIES = {
     "2.0": dict.fromkeys(("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"), "true"),
     "3.0": dict.fromkeys(("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"), "true"),
 }
+VECTORS = {("x", "y", "z"): "", ("fx", "fy", "fz"): "force", ("tx", "ty", "tz"): "moment"}
+"""Components that are one array, and what they are called after what they are of."""
 STEPS = 500
 """Communication points of the default experiment."""
 
@@ -33,12 +37,15 @@ class Variable(NamedTuple):
     causality : {"input", "parameter", "output"}
     start : float or None
         None of outputs.
+    size : int, optional
+        Of an array how many numbers it has; 0 for a scalar.
     """
 
     name: str
     unit: str
     causality: str
     start: float | None
+    size: int = 0
 
 
 class Description(NamedTuple):
@@ -51,7 +58,7 @@ class Description(NamedTuple):
     start, end : float
         Span in which it can be simulated, s.
     variables : list of Variable
-        By their references, from 0 on.
+        Their references count the numbers in them, from 0 on.
     """
 
     name: str
@@ -63,10 +70,39 @@ class Description(NamedTuple):
     variables: list[Variable]
 
 
-def variables_of(numbers: Mapping[str, tuple[str, str, float]], told: Sequence[Told]) -> list[Variable]:
-    """Return the variables of a model: numbers by name with kind, unit and present value, then outputs."""
-    set_ = [Variable(name, unit, kind, value) for name, (kind, unit, value) in numbers.items()]
-    return [*set_, *(Variable(one.name, one.unit, "output", None) for one in told)]
+def variables_of(
+    numbers: Mapping[str, tuple[str, str, float]], told: Sequence[Told], arrays: bool = False
+) -> list[Variable]:
+    """Return the variables of a model: numbers by name with kind, unit and present value, then outputs.
+
+    With ``arrays`` components of a vector that follow each other are one output.
+    """
+    found = [Variable(name, unit, kind, value) for name, (kind, unit, value) in numbers.items()]
+    outputs = [Variable(one.name, one.unit, "output", None) for one in told]
+    k = 0
+    while k < len(outputs):
+        vector = _vector(outputs, k) if arrays else None
+        found.append(vector or outputs[k])
+        k += max(1, found[-1].size)
+    return found
+
+
+def _vector(outputs: Sequence[Variable], k: int) -> Variable | None:
+    """Return the array that begins with an output, None if none does."""
+    of, _, first = outputs[k].name.rpartition(".")
+    for components, name in VECTORS.items():
+        if [one.name for one in outputs[k : k + 3]] == [f"{of}.{c}" for c in components]:
+            return outputs[k]._replace(name=f"{of}.{name}".rstrip("."), size=len(components))
+    size = 0
+    if first == "0":
+        while k + size < len(outputs) and outputs[k + size].name == f"{of}.{size}":
+            size += 1
+    return outputs[k]._replace(name=of, size=size) if size > 1 else None
+
+
+def widths_of(variables: Sequence[Variable]) -> list[int]:
+    """Return of each number how many a variable of its reference has, 0 where none begins."""
+    return [width for one in variables for width in (max(1, one.size), *[0] * (one.size - 1))]
 
 
 def _unit_name(unit: str) -> str:
@@ -113,13 +149,14 @@ def model_description(told: Description, version: str) -> bytes:
         stepSize=repr((told.end - told.start) / STEPS),
     )  # fmt: skip
     listed, structure = xml.SubElement(root, "ModelVariables"), xml.Element("ModelStructure")
+    references = np.cumsum([0, *(max(1, variable.size) for variable in told.variables)]).tolist()
     if not second:
         # time has a reference of its own behind all others
         xml.SubElement(
-            listed, "Float64", name="time", valueReference=str(len(told.variables)), causality="independent",
+            listed, "Float64", name="time", valueReference=str(references[-1]), causality="independent",
             variability="continuous",
         )  # fmt: skip
-    for reference, variable in enumerate(told.variables):
+    for reference, variable in zip(references, told.variables, strict=False):
         variability = "tunable" if variable.causality == "parameter" else "continuous"
         attributes = {
             "name": variable.name, "valueReference": str(reference), "causality": variable.causality,
@@ -134,7 +171,9 @@ def model_description(told: Description, version: str) -> bytes:
         if second:
             xml.SubElement(xml.SubElement(listed, "ScalarVariable", attributes), "Real", real)
         else:
-            xml.SubElement(listed, "Float64", attributes | real)
+            element = xml.SubElement(listed, "Float64", attributes | real)
+            if variable.size:
+                xml.SubElement(element, "Dimension", start=str(variable.size))
     outputs = [k for k, variable in enumerate(told.variables) if variable.causality == "output"]
     if second:
         for kind in ("Outputs", "InitialUnknowns") if outputs else ():
@@ -144,7 +183,7 @@ def model_description(told: Description, version: str) -> bytes:
     else:
         for kind in ("Output", "InitialUnknown"):
             for k in outputs:
-                xml.SubElement(structure, kind, valueReference=str(k))
+                xml.SubElement(structure, kind, valueReference=str(references[k]))
     root.append(structure)
     xml.indent(root)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="utf-8")

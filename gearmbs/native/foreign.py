@@ -166,7 +166,9 @@ class ForeignFMU:
             simulator.control(name, one if self._rolled_back else one.value, sample_time)
 
     def _named(self, causality: str) -> list[str]:
-        return [n for n, one in self._variables.items() if one.causality == causality and one.type in REAL]
+        # arrays are none of them
+        known = self._variables.items()
+        return [n for n, one in known if one.causality == causality and one.type in REAL and not one.dimensions]
 
     def _check(self, name: str, what: str, known: list[str]) -> None:
         if name not in known:

@@ -24,10 +24,11 @@ from gearmbs.kernels import PLAIN
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import markers_kept
 from gearmbs.mechanism.solve.simulator import Begun, Simulator
-from gearmbs.native.fmu import Description, variables_of, write_fmu
+from gearmbs.native.asked import Told
+from gearmbs.native.fmu import Description, variables_of, widths_of, write_fmu
 from gearmbs.native.kernels import Kernels
 from gearmbs.native.memory import Memory, memory_of
-from gearmbs.native.outputs import Told, chosen_outputs
+from gearmbs.native.outputs import chosen_outputs
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
@@ -81,6 +82,7 @@ def export(
     outputs: Sequence[Any] | None = None,
     processor: str | None = None,
     compiler: str | None = None,
+    arrays: bool = False,
     report: Callable[[str], None] | None = None,
     **options: Unpack[SimulatorOptions],
 ) -> Exported:
@@ -107,6 +109,8 @@ def export(
         machines this one.
     compiler : str, optional
         Command of the C compiler. Default: cc, gcc or clang, whichever there is, or that of the package ziglang.
+    arrays : bool
+        Whether an FMU of FMI 3.0 has components of vectors as arrays, and not one by one.
     report : callable, optional
         Called with the name of each kernel that is about to be compiled.
     **options
@@ -123,6 +127,8 @@ def export(
     """
     if target not in TARGETS:
         raise ModelError(f"target = {target!r}; choose {any_of(list(TARGETS))}")
+    if arrays and target != "fmu3":
+        raise ModelError(f"arrays: target {target!r} has none; leave it out, or choose 'fmu3'")
     if PLAIN:
         raise ModelError("export: libraries are made by the compiler's own mode; unset GEARMBS_COMPILER")
     if isinstance(model, Mechanism):
@@ -149,12 +155,14 @@ def export(
                 f"output {twice!r}: the name is given twice; leave one of the two out, or give it another name"
             )
         memory = memory_of(begun, numbers, told, kernels.number)
+    known = {key: (n.kind, n.unit, n.value(begun.run.state.rdata, begun.point.t)) for key, n in numbers.items()}
+    variables = variables_of(known, told, arrays)
     processor = processor or PORTABLE.get(platform.machine(), "native")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     stem = re.sub(r"\W+", "_", title).strip("_") or "model"
     with tempfile.TemporaryDirectory(prefix="gearmbs-") as room:
-        texts, token = _texts(begun, title, memory, numbers, told, model.t_end)
+        texts, token = _texts(begun, title, memory, numbers, told, model.t_end, widths_of(variables))
         made = _compile(Path(room), command, SOURCES[target], kernels, processor, memory, texts, report or _silent)
         version = TARGETS[target]
         if version is None:
@@ -163,10 +171,8 @@ def export(
             for file in ("gearmbs.h", "example.c", "example.cpp"):
                 (folder / file).write_bytes(_source(file))
         else:
-            rdata, t = begun.run.state.rdata, begun.point.t
-            known = {key: (number.kind, number.unit, number.value(rdata, t)) for key, number in numbers.items()}
             described = Description(
-                title, stem, token, f"gearmbs {gearmbs.__version__}", float(t), model.t_end, variables_of(known, told)
+                title, stem, token, f"gearmbs {gearmbs.__version__}", float(begun.point.t), model.t_end, variables
             )
             library = write_fmu(folder / f"{stem}.fmu", described, version, made)
     units = {key: number.unit for key, number in numbers.items()}
@@ -235,7 +241,9 @@ def pieces_of(block: np.ndarray) -> np.ndarray:
     return np.stack([first, last + 1], axis=1).astype(np.int64)
 
 
-def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[Told], t_end: float) -> tuple[str, str]:
+def _texts(
+    begun: Begun, title: str, memory: Memory, numbers: dict, told: list[Told], t_end: float, widths: list[int]
+) -> tuple[str, str]:
     """Return the part of the model's description that does not depend on its objects, and a token for all of it."""
     layout = memory.layout
     digest = hashlib.sha256(layout.block.tobytes() + repr(memory[1:]).encode()).hexdigest()[:16]
@@ -249,12 +257,13 @@ def _texts(begun: Begun, title: str, memory: Memory, numbers: dict, told: list[T
     lines.append(_array("const int64_t", "functions", layout.functions.ravel().tolist()))
     pieces = pieces_of(layout.block)
     lines.append(_array("const int64_t", "pieces", pieces.ravel().tolist()))
+    lines.append(_array("const int64_t", "widths", widths))
     token = hashlib.sha256("\n".join([digest, title, *lines]).encode()).hexdigest()[:32]
     fields = {
         "name": _text(title), "digest": _text(digest), "token": _text(token),
         "t_start": repr(float(begun.point.t)), "t_end": repr(float(t_end)),
         "block": layout.block.size, "state": layout.state, "size": layout.size,
-        "piece_count": len(pieces), "pieces": "pieces",
+        "piece_count": len(pieces), "pieces": "pieces", "widths": "widths",
         "inside_count": len(layout.inside), "function_count": len(layout.functions),
         "inside": "inside", "functions": "functions", "kernels": "kernels",
         "late_count": "LATE", "late_names": "late_names", "late": "late",

@@ -23,11 +23,10 @@ from gearmbs.dae.problem import INPUT, DAEProblem, Number
 from gearmbs.kernels.bound import NAMES
 from gearmbs.kernels.lanes import LANES
 from gearmbs.mechanism.solve.simulator import Begun
-from gearmbs.native.asked import Expressions, expressions_of
+from gearmbs.native.asked import Expressions, Told, expressions_of
 from gearmbs.native.driver import Driver
 from gearmbs.native.image import CONSTANT, SCRATCH, STATE, Image, Layout, member_of, word_of
 from gearmbs.native.kernels import BY_ADDRESS
-from gearmbs.native.outputs import Told
 from gearmbs.native.pivots import PlanRoom
 from gearmbs.native.teller import Teller
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gearmbs.mechanism.compile import scope_of, starting_angles
 from gearmbs.mechanism.language.library import compile_expression
 from gearmbs.mechanism.parts.joints import kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.solve.simulator import Begun, Simulator
-from gearmbs.native.asked import Counted
+from gearmbs.native.asked import Counted, Told
 from gearmbs.native.series import FORCE, LOADS, MOMENT, NUMBER, POSE, SOLUTION, UNKNOWN
 
 AXES = ("x", "y", "z")
@@ -35,30 +35,6 @@ MODAL = {"modal_coordinates": (0, "1"), "modal_velocities": (1, "1/s")}
 """Quantities of bodies that deform, by the number of a mode."""
 OF_JOINT = ("joint_angle", "joint_displacement", "joint_rate")
 """Quantities of joints that are told as expressions."""
-
-
-class Told(NamedTuple):
-    """An output.
-
-    Attributes
-    ----------
-    name, unit : str
-    places : tuple of (int, int)
-        Records, and places in them, of the numbers that add up to it.
-    tape : Tape, optional
-        An expression instead of a sum.
-    entries : tuple of tuple of (int, int)
-        Of each unknown of the expression the numbers that add up to it.
-    counted : Counted
-        Its counted angles.
-    """
-
-    name: str
-    unit: str
-    places: tuple[tuple[int, int], ...]
-    tape: Tape | None = None
-    entries: tuple[tuple[tuple[int, int], ...], ...] = ()
-    counted: Counted = Counted()
 
 
 class Finder:

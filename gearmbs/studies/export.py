@@ -120,6 +120,7 @@ def export(
     processor: Annotated[
         str | None, typer.Option(help="A name of LLVM's, or native; default: any x86-64 with AVX2 and FMA.")
     ] = None,
+    arrays: Annotated[bool, typer.Option("--arrays", help="Of fmu3: vectors as arrays, not one by one.")] = False,
     torques: Annotated[
         str | None, typer.Option(help='Of tables, on the driven wheel, e.g. "20 N m, 50 N m"; default: about the load.')
     ] = None,
@@ -139,10 +140,12 @@ def export(
 
         mechanism, end, options = described_model(file)
         folder = out or file.with_suffix("")
-        made = exported(mechanism, folder, target=target, t_end=t_end or end, name=name, processor=processor, **options)
-        for what, given in (("set", made.numbers), ("told", made.outputs)):
-            typer.echo(f"can be {what}: {len(given)}")
+        made = exported(
+            mechanism, folder, target=target, t_end=t_end or end, name=name, processor=processor, arrays=arrays,
+            **options,
+        )  # fmt: skip
+        for what, named in (("set", made.numbers), ("told", made.outputs)):
+            typer.echo(f"can be {what}: {len(named)}")
         if made.left_out:
-            why = "they count angles or look at frames of bodies that deform"
-            typer.echo(f"note: left out, for {why}: {', '.join(made.left_out)}", err=True)
+            typer.echo(f"note: left out, which a library does not tell: {', '.join(made.left_out)}", err=True)
         typer.echo(f"wrote {made.library}")

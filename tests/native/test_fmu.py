@@ -12,8 +12,9 @@ import pytest
 import gearmbs as gm
 from gearmbs.mechanism import ModelError
 from gearmbs.native import export
+from gearmbs.native.asked import Told
 from gearmbs.native.fmu import Description, model_description, variables_of
-from gearmbs.native.outputs import Told
+from gearmbs.native.outputs import OF_BODY
 from gearmbs.studies.run.simulation import case_mechanism
 from tests.says import says
 
@@ -79,18 +80,18 @@ class Driven:
         self.fmu.doStep(currentCommunicationPoint=self.t, communicationStepSize=size)
         self.t += size
 
-    def derivative(self, unknowns, known, along):
-        """Derivatives of outputs along a direction of numbers."""
+    def derivative(self, unknowns, known, along, rows=None):
+        """Derivatives of outputs along a direction of numbers; of arrays as many as they have numbers."""
         from ctypes import c_double, c_uint32
 
-        sizes = [len(unknowns), len(known)]
+        sizes, count = [len(unknowns), len(known)], rows or len(unknowns)
         rows, columns = ((c_uint32 * len(names))(*(self.references[n] for n in names)) for names in (unknowns, known))
-        seed, values = (c_double * sizes[1])(*along), (c_double * sizes[0])()
+        seed, values = (c_double * sizes[1])(*along), (c_double * count)()
         if self.second:
             self.fmu.fmi2GetDirectionalDerivative(self.fmu.component, rows, sizes[0], columns, sizes[1], seed, values)
         else:
             self.fmu.fmi3GetDirectionalDerivative(
-                self.fmu.component, rows, sizes[0], columns, sizes[1], seed, sizes[1], values, sizes[0]
+                self.fmu.component, rows, sizes[0], columns, sizes[1], seed, sizes[1], values, count
             )
         return np.array(values)
 
@@ -336,6 +337,48 @@ def test_names_and_targets():
         export(m, "nowhere", t_end=1.0, target="fmu2", outputs=[speed, speed])
     with pytest.raises(ModelError, match=says("target", "fmu4", "fmu3")):
         export(m, "nowhere", t_end=1.0, target="fmu4")
+
+
+def test_arrays(tmp_path):
+    """Vectors of an FMU 3.0 as arrays are, number for number, what they are one by one; so are derivatives."""
+    from fmpy.validation import validate_fmu
+
+    one, other = (
+        export(mechanism(), tmp_path / name, t_end=END, target="fmu3", processor="native", arrays=name == "arrays")
+        for name in ("scalars", "arrays")
+    )
+    assert validate_fmu(str(other.library)) == []
+    told = {v.name: v for v in fmpy.read_model_description(str(other.library)).modelVariables}
+    vectors = {name: int(v.dimensions[0].start) for name, v in told.items() if v.dimensions}
+    bodies = list(mechanism().bodies)
+    assert vectors == {
+        **{f"{body}.{what}": 3 for body in bodies for what in OF_BODY},
+        **{f"{element}.load.{part}": 3 for element in mechanism().elements for part in ("force", "moment")},
+        **{f"{joint}.reaction.{part}": 3 for joint in mechanism().joints for part in ("force", "moment")},
+    }
+    assert told["mesh.load.moment"].unit == "N m"
+    assert told["load.torque"].dimensions == []
+    # a simulation here takes numbers alone
+    foreign = gm.native.ForeignFMU(other.library, {})
+    assert not vectors.keys() & set(foreign.outputs)
+    scalars, arrays = (Driven(str(made.library), tmp_path / f"{k}").begin() for k, made in enumerate((one, other)))
+    for driven in (scalars, arrays):
+        driven.set(load__torque=60.0)
+        driven.step(0.3 * END)
+    for name, parts in (("mesh.load.moment", ("tx", "ty", "tz")), (f"{bodies[0]}.com_velocity", "xyz")):
+        wanted = scalars.get(*(f"{name.removesuffix('.moment')}.{part}" for part in parts))
+        got = arrays.fmu.getFloat64([arrays.references[name], arrays.references["load.torque"]], nValues=4)
+        np.testing.assert_array_equal(got, [*wanted, 60.0])
+    body = "gear 2.angular_acceleration"
+    wanted = scalars.derivative([f"{body}.{axis}" for axis in "xyz"], ["load.torque"], [1.0])
+    assert np.abs(wanted).max() > 0.0
+    np.testing.assert_array_equal(arrays.derivative([body], ["load.torque"], [1.0], rows=3), wanted)
+    with pytest.raises(Exception, match="fmi3GetFloat64"):
+        arrays.fmu.getFloat64([arrays.references[body]], nValues=2)
+    for driven in (scalars, arrays):
+        driven.end()
+    with pytest.raises(ModelError, match=says("arrays", "fmu2", "fmu3")):
+        export(mechanism(), tmp_path, t_end=END, target="fmu2", arrays=True)
 
 
 def test_units_of_a_description():

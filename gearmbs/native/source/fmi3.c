@@ -1,6 +1,7 @@
 /* FMI 3.0 for Co-Simulation, see https://fmi-standard.org; what models of 64-bit floating-point numbers need. */
 
 #include "fmu.h"
+#include "model.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -61,14 +62,36 @@ GEARMBS_API fmi3Status fmi3EnterStepMode(fmi3Instance c) { return (void)c, FMU_O
 GEARMBS_API fmi3Status fmi3Terminate(fmi3Instance c) { return (void)c, FMU_OK; }
 GEARMBS_API fmi3Status fmi3Reset(fmi3Instance c) { return fmu_reset(c); }
 
+/* Return the references of all numbers of some variables, NULL if they are not as many as there are values; to be freed. */
+static unsigned *references_of(const fmu *self, const fmi3ValueReference r[], size_t n, size_t count) {
+    size_t known = gearmbs_numbers() + gearmbs_outputs(), sum = 0;
+    unsigned *all = malloc((count + 1) * sizeof *all);
+    for (size_t k = 0; k < n && all != NULL; k++) {
+        /* the time stands behind all others */
+        size_t width = r[k] < known ? (size_t)gearmbs_this.widths[r[k]] : 1;
+        for (size_t e = 0; e < width && sum + e < count; e++) all[sum + e] = r[k] + (unsigned)e;
+        sum += width;
+    }
+    if (all != NULL && sum == count) return all;
+    fmu_refuse(self, "There are not as many values as the variables have.");
+    free(all);
+    return NULL;
+}
+
 GEARMBS_API fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference r[], size_t n, double values[],
                                       size_t count) {
-    return n == count ? fmu_get(c, r, n, values) : fmu_refuse(c, "All variables are scalars.");
+    unsigned *all = references_of(c, r, n, count);
+    int status = all == NULL ? FMU_ERROR : fmu_get(c, all, count, values);
+    free(all);
+    return status;
 }
 
 GEARMBS_API fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference r[], size_t n, const double values[],
                                       size_t count) {
-    return n == count ? fmu_set(c, r, n, values) : fmu_refuse(c, "All variables are scalars.");
+    unsigned *all = references_of(c, r, n, count);
+    int status = all == NULL ? FMU_ERROR : fmu_set(c, all, count, values);
+    free(all);
+    return status;
 }
 
 static fmi3Status none(fmi3Instance c, size_t n) {
@@ -159,8 +182,13 @@ GEARMBS_API fmi3Status fmi3DoStep(fmi3Instance c, double time, double size, bool
 GEARMBS_API fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t rows,
                                                     const fmi3ValueReference known[], size_t columns,
                                                     const double along[], size_t size, double values[], size_t count) {
-    if (size != columns || count != rows) return fmu_refuse(c, "All variables are scalars.");
-    return fmu_derivative(c, unknowns, rows, known, columns, along, values);
+    unsigned *outputs = references_of(c, unknowns, rows, count), *inputs = references_of(c, known, columns, size);
+    int status = outputs == NULL || inputs == NULL
+                     ? FMU_ERROR
+                     : fmu_derivative(c, outputs, count, inputs, size, along, values);
+    free(outputs);
+    free(inputs);
+    return status;
 }
 
 /* What this model has none of: arrays that change, clocks, events, derivatives by time and backwards. */

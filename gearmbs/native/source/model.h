@@ -25,6 +25,7 @@ typedef struct {
     int64_t time, present, steps, waiting, wanted, values, rates, out;
     int64_t counts;                            /* whether outputs count angles from point to point */
     int64_t numbers, outputs, unknowns;
+    const int64_t *widths;                     /* of each number and output how many a variable of its reference has */
     const char *const *number_names, *const *number_units;
     const char *const *output_names, *const *output_units;
     const char *const *unknown_names;
