@@ -155,6 +155,10 @@ CALLS = {
         UNUSED | {"xarray", "pandas"},
     ),
     "run_case": (f"from gearmbs.studies import make_case, run_case; run_case({CASE})", UNUSED),
+    "plain_record": (
+        f"from gearmbs.studies import make_case, plain_record; plain_record({CASE}).values('gmf_rms')",
+        UNUSED | {"xarray", "pandas"},
+    ),
     "a campaign's case": (
         "from gearmbs.campaigns import PairSubject; s = PairSubject(); c = s.check(s.base(), 'a'); "
         "keep = ['harmonics', 'contact']; s.reduce(c, s.run(c, lambda f: None, keep), keep)",

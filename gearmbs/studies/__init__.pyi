@@ -48,6 +48,7 @@ from .run.simulation import SimulationFailed as SimulationFailed
 from .run.simulation import SimulationInterrupted as SimulationInterrupted
 from .run.simulation import case_mechanism as case_mechanism
 from .run.simulation import case_train as case_train
+from .run.simulation import plain_record as plain_record
 from .run.simulation import run_case as run_case
 from .run.simulation import simulate_case as simulate_case
 from .run.steady import SteadyCase as SteadyCase

@@ -4,27 +4,39 @@ import numpy as np
 import pytest
 
 from gearmbs.campaigns.subjects.pair import contact_numbers, harmonics, record_numbers
-from gearmbs.studies import Case, run_case
+from gearmbs.signals import gmf_rms
+from gearmbs.signals.files.simulated import record_signal
+from gearmbs.studies import Case, plain_record, run_case
 from gearmbs.studies.run import periodic
-from gearmbs.studies.run.simulation import plain_record
 
 AUTO = Case(operation={"duration": "auto"}, solver={"lump": True})
-ASKED = ("gmf_rms", "normal_force", "transmission_error", "penetration_drive", "pairs_back")
+GIVEN = Case(operation={"duration": 0.1, "settling": 0.0}, solver={"lump": True})
+ASKED = ("gmf_rms", "acceleration", "normal_force", "transmission_error", "penetration_drive", "pairs_back")
 
 
-def test_numbers_of_a_plain_record_are_those_of_its_dataset():
-    plain = plain_record(AUTO, variables=ASKED)
+@pytest.mark.parametrize("case", [AUTO, GIVEN], ids=["auto", "given"])
+def test_numbers_of_a_plain_record_are_those_of_its_dataset(case):
+    plain = plain_record(case, variables=ASKED)
     dataset = plain.dataset()
     assert {*dataset.data_vars} == {*ASKED}
-    for name in (*ASKED, "way", "harmonic", "component", "time"):
+    for name in (*ASKED, "way", "harmonic", "component", "time", "signal_time"):
         assert name in plain or name in plain.coords
         np.testing.assert_array_equal(plain.values(name), dataset[name].values)
     assert plain.told.items() <= dataset.attrs.items()
-    for numbers in (harmonics, record_numbers):
-        assert numbers(plain) == numbers(dataset) != {}
-    assert contact_numbers(AUTO, plain) == contact_numbers(AUTO, dataset)
+    assert harmonics(plain) == harmonics(dataset) != {}
+    assert record_numbers(plain) == record_numbers(dataset)
+    assert bool(record_numbers(plain)) == case.is_auto
+    assert contact_numbers(case, plain) == contact_numbers(case, dataset)
     levels = dataset["gmf_rms"].sel(way="orders", component="line_of_action", harmonic=2)
     assert harmonics(plain)["orders.line_of_action.2"] == float(levels)
+
+
+def test_levels_of_a_record_are_those_of_its_signal():
+    """By the analysis of measurements, which knows the acceleration alone."""
+    record = plain_record(GIVEN, variables=["gmf_rms", "acceleration"]).dataset()
+    found = gmf_rms(record_signal(record), GIVEN.mesh_frequency, teeth=1)
+    for way in ("band", "orders"):
+        np.testing.assert_array_equal(record["gmf_rms"].sel(way=way), found[way])
 
 
 def test_whoever_asks_for_levels_has_no_series_made(monkeypatch):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from numbers import Integral
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -66,23 +66,23 @@ def band_rms(
     xarray.DataArray of dimension (channel,)
     """
     fundamental = 1.0 / period if period else frequency
-    levels = _band_levels(signal, rate_of(signal), [frequency], half_width, transition, fundamental)
+    levels = _band_levels(signal.values, rate_of(signal), [frequency], half_width, transition, fundamental)
     return _per_channel(signal, levels[0])
 
 
 def _band_levels(
-    signal: xr.DataArray,
+    values: np.ndarray,
     rate: float,
     centres: Sequence[float],
     half_width: float,
     transition: float,
     fundamental: float,
 ) -> np.ndarray:
-    """RMS of each channel, sampled at ``rate``, in bands about ``centres``, over whole periods; all in Hz.
+    """RMS of each channel of (n, channels), sampled at ``rate``, in bands about ``centres``, over whole periods, in Hz.
 
     See `band_rms`. Shape (bands, channels).
     """
-    n = signal.sizes["time"]
+    n = len(values)
     filters = []
     for centre in centres:
         filters.append(bandpass_taps(rate, centre - half_width, centre + half_width, transition, ATTENUATION_DB))
@@ -94,7 +94,7 @@ def _band_levels(
     # all of one length, which the transition decides
     bank = np.stack(filters)
     count = whole_period_count(n - bank.shape[1] + 1, rate, fundamental)
-    return np.sqrt(filtered_mean_squares(signal.values.T, bank, count))
+    return np.sqrt(filtered_mean_squares(values.T, bank, count))
 
 
 def order_rms(
@@ -115,13 +115,57 @@ def order_rms(
     import xarray as xr
 
     orders = [float(k) for k in orders]
-    amplitudes = np.abs(harmonic_amplitudes(signal.values, rate_of(signal), fundamental, np.asarray(orders), least))
     return xr.DataArray(
-        amplitudes / math.sqrt(2.0),
+        line_levels(signal.values, rate_of(signal), fundamental, np.asarray(orders), least),
         dims=("order", "channel"),
         coords={"order": orders, **_channel_coords(signal)},
         attrs={"units": common_unit(signal), "long_name": "RMS"},
     )
+
+
+def line_levels(
+    values: np.ndarray, rate: float, fundamental: float, orders: np.ndarray, least: int = MIN_PERIODS
+) -> np.ndarray:
+    """RMS of the lines at multiples of a fundamental, (m, channels); see `order_rms`."""
+    return np.abs(harmonic_amplitudes(values, rate, fundamental, orders, least)) / math.sqrt(2.0)
+
+
+class MeshLevels(NamedTuple):
+    """RMS of mesh harmonics by both ways, (harmonics, channels), and the whole turns they are of; see `gmf_rms`."""
+
+    band: np.ndarray
+    orders: np.ndarray
+    turns: tuple[int, int]
+
+
+def mesh_levels(
+    values: np.ndarray,
+    rate: float,
+    gmf: float,
+    per_turn: int = 1,
+    harmonics: int = 3,
+    half_width: float = HALF_WIDTH,
+) -> MeshLevels:
+    """RMS of the first harmonics of a mesh frequency by `gmf_rms`, of plain arrays.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, channels)
+    rate, gmf : float
+        Hz.
+    per_turn : int
+        Mesh periods of a turn.
+    harmonics, half_width
+        As for `gmf_rms`.
+    """
+    multiples = np.arange(1, harmonics + 1)
+    turn, count = gmf / per_turn, len(values)
+    taps = kaiser_order(ATTENUATION_DB, TRANSITION * gmf / (0.5 * rate))[0] | 1
+    turns = max(0, math.floor((count - taps + 1) * turn / rate)), _whole_periods(count, turn / rate)
+    in_band, in_orders = (per_turn if whole else 1 for whole in turns)
+    by_band = _band_levels(values, rate, list(multiples * gmf), half_width * gmf, TRANSITION * gmf, gmf / in_band)
+    least = math.ceil(MIN_PERIODS / in_orders)
+    return MeshLevels(by_band, line_levels(values, rate, gmf / in_orders, multiples * in_orders, least), turns)
 
 
 def check_harmonics(harmonics: object) -> None:
@@ -203,14 +247,7 @@ def gmf_rms(
     rate = rate_of(signal)
     known = teeth if teeth is not None else signal.attrs.get("teeth")
     per_turn = 1 if known is None else check_teeth(known)[0]
-    turn, count = gmf / per_turn, signal.sizes["time"]
-    taps = kaiser_order(ATTENUATION_DB, TRANSITION * gmf / (0.5 * rate))[0] | 1
-    turns = max(0, math.floor((count - taps + 1) * turn / rate)), _whole_periods(count, turn / rate)
-    in_band, in_orders = (per_turn if whole else 1 for whole in turns)
-    widths = half_width * gmf, TRANSITION * gmf
-    by_band = _band_levels(signal, rate, list(multiples * gmf), *widths, gmf / in_band)
-    least = math.ceil(MIN_PERIODS / in_orders)
-    by_orders = order_rms(signal, gmf / in_orders, list(multiples * in_orders), least=least).values
+    by_band, by_orders, turns = mesh_levels(signal.values, rate, gmf, per_turn, harmonics, half_width)
     units = common_unit(signal)
     dims = ("harmonic", "channel")
     return xr.Dataset(

@@ -150,6 +150,18 @@ def _columns(
             values = values[:, None]
     if values.ndim != 2 or 0 in values.shape:
         raise SignalError(f"data: must have shape (samples, channels) and be non-empty, got {values.shape}")
+    check_finite(values)
+    return values, channels
+
+
+def check_finite(values: np.ndarray) -> None:
+    """Refuse samples, (n, channels), that are not finite.
+
+    Raises
+    ------
+    SignalError
+        It tells the first one.
+    """
     bad = ~np.isfinite(values)
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
@@ -157,7 +169,6 @@ def _columns(
             f"data: {int(bad.sum())} samples are not finite, the first at row {row}, channel {column}; "
             "cut or repair the record first"
         )
-    return values, channels
 
 
 def as_signal(signal: xr.DataArray | xr.Dataset, rate: float | None = None) -> xr.DataArray:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearmbs.signals import gmf_rms
-from gearmbs.signals.analysis.bands import HALF_WIDTH, order_rms
+from gearmbs.signals.analysis.bands import HALF_WIDTH, line_levels, mesh_levels
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.case.limits import HARMONICS, band_taps, geometric_period, holds_period, least_for_bands
 
@@ -29,29 +28,33 @@ def told_way(records: Iterable[xr.Dataset]) -> str:
     return WAYS[0] if all(np.isfinite(one.sel(way=WAYS[0]).values).all() for one in levels) else WAYS[1]
 
 
-def mesh_levels(case: Case, acceleration: xr.DataArray) -> tuple[tuple, dict[str, Any]]:
-    """Return the RMS of the mesh harmonics by both ways, as `level_parts` does.
+def levels_of(case: Case, acceleration: np.ndarray) -> np.ndarray:
+    """Return the RMS of the mesh harmonics by both ways, shape (2, harmonics, components).
 
     Bands are NaN of a record that is too short for them.
 
     Both are those of whole periods of the faulty teeth where the record holds one. A record that is not longer than one
     by as much as the band-passes take is seen as a part of a motion that repeats itself.
+
+    Parameters
+    ----------
+    case : Case
+    acceleration : ndarray, shape (n, components)
+        At the signal rate, m/s^2.
     """
-    gmf, longest = case.mesh_frequency, case.operation.longest
+    gmf, longest, rate = case.mesh_frequency, case.operation.longest, case.signal_rate
     period = geometric_period(case) if holds_period(case) else 1
 
     def lines(numbers: np.ndarray) -> np.ndarray:
-        return order_rms(acceleration, gmf / period, list(numbers), least=1).values
+        return line_levels(acceleration, rate, gmf / period, numbers, least=1)
 
     if longest >= least_for_bands(case) + (period - 1) / gmf:
-        found = gmf_rms(acceleration, gmf, teeth=period)
-        values = np.stack([found[way].values for way in WAYS])
-    elif period > 1:
-        values = np.stack([bands_of_lines(case, period, lines), lines(period * np.arange(1, HARMONICS + 1))])
-    else:
-        orders = order_rms(acceleration, gmf, list(range(1, HARMONICS + 1))).values
-        values = np.stack([np.full_like(orders, np.nan), orders])
-    return level_parts(values, acceleration["channel"].values, gmf)
+        found = mesh_levels(acceleration, rate, gmf, period, HARMONICS)
+        return np.stack([found.band, found.orders])
+    if period > 1:
+        return np.stack([bands_of_lines(case, period, lines), lines(period * np.arange(1, HARMONICS + 1))])
+    orders = line_levels(acceleration, rate, gmf, np.arange(1, HARMONICS + 1))
+    return np.stack([np.full_like(orders, np.nan), orders])
 
 
 def bands_of_lines(case: Case, periods: int, lines: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:

@@ -20,11 +20,12 @@ from gearmbs.signals import even_signal, make_signal
 from gearmbs.signals.conversion import COMPONENTS, component_values
 from gearmbs.signals.filters import apply_zero_phase, decimation_taps
 from gearmbs.signals.resampling import monotone_cubic
+from gearmbs.signals.signal.signal import check_finite, check_rate, check_speed, check_teeth
 from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.drive import drive_angle
 from gearmbs.studies.case.limits import remarks
 from gearmbs.studies.case.sections import units_of_fields
-from gearmbs.studies.run.levels import LEVELS, level_parts, mesh_levels, tracked_levels
+from gearmbs.studies.run.levels import LEVELS, level_parts, levels_of, tracked_levels
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of, to_mesh
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ Parts = tuple[dict[str, Any], dict[str, Any]]
 
 @dataclass
 class PlainRecord:
-    """What a record holds, as plain arrays: whoever asks for a number of it loads no xarray.
+    """What a record holds, as plain arrays: whoever asks for a number of it loads no xarray, but of a run-up.
 
     Attributes
     ----------
@@ -163,23 +164,33 @@ def evaluate(
         data[level], of_levels = level_parts(levels, np.array(COMPONENTS), case.mesh_frequency)
     if made & {"acceleration", *LEVELS}:
         assert forces is not None
-        acceleration = _acceleration(case, forces, start, signal_stop)
-        t = acceleration["time"].values
+        t, acceleration = _acceleration(case, forces, start, signal_stop)
         turning = {} if case.operation.speed_curve is None else _turning(case, t)
         if "acceleration" in wanted:
             told = {
+                **_about_acceleration(case),
                 "units": "m/s^2",
                 "long_name": "force on the driven gear over its mass (Newton's second law)",
                 "teeth_in_mesh": teeth_in_mesh(case, start),
             }
-            data["acceleration"] = ("signal_time", "component"), acceleration.values, {**acceleration.attrs, **told}
+            data["acceleration"] = ("signal_time", "component"), acceleration, told
             coords["signal_time"] = ("signal_time", t, {"units": "s"})
-            coords["component"] = acceleration["channel"].values
+            coords["component"] = np.array(COMPONENTS)
             coords |= turning
         if level in made and level == "gmf_rms":
-            data[level], of_levels = mesh_levels(case, acceleration)
+            data[level], of_levels = level_parts(
+                levels_of(case, acceleration), np.array(COMPONENTS), case.mesh_frequency
+            )
         elif level in made:
-            data[level] = tracked_levels(case, acceleration, turning)
+            signal = make_signal(
+                acceleration,
+                case.signal_rate,
+                units="m/s^2",
+                channels=COMPONENTS,
+                t0=float(t[0]),
+                attrs=_about_acceleration(case),
+            )
+            data[level] = tracked_levels(case, signal, turning)
     return data, {**coords, **of_levels}
 
 
@@ -288,10 +299,9 @@ def _parts_over_time(t: np.ndarray, values: dict[str, np.ndarray]) -> Parts:
     return data, coords
 
 
-def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) -> xr.DataArray:
-    """Return the components of the force on the driven gear over its mass, at the signal rate."""
+def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and the components of the force on the driven gear over its mass, at the signal rate."""
     pair, rate = case.pair(), case.signal_rate
-    angle, mass = pair.working_pressure_angle, pair.wheels[1].mass
     force, t = forces.values[:, -4:], forces.t
     if rate < case.output_rate:
         ratio = round(case.output_rate / rate)
@@ -299,19 +309,23 @@ def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) ->
         t = t[first] + np.arange(len(force)) / rate
     first, last = np.searchsorted(t, [at - 0.5 / rate for at in (start, stop)])
     force = force[first:last]
-    values = component_values(force[:, :-1], angle, to_mesh(pair), sense=pair.rotation)
+    values = component_values(force[:, :-1], pair.working_pressure_angle, to_mesh(pair), sense=pair.rotation)
     values[:, -1] = force[:, -1]
-    values /= mass
-    return make_signal(
-        values,
-        rate,
-        units="m/s^2",
-        channels=COMPONENTS,
-        t0=float(t[first]),
-        speed=case.operation.top_speed,
-        teeth=case.gears.teeth,
-        attrs={"pressure_angle": angle, "mass": mass},
-    )
+    values /= pair.wheels[1].mass
+    check_finite(values)
+    return t[first] + np.arange(len(values)) / rate, values
+
+
+def _about_acceleration(case: Case) -> dict[str, Any]:
+    """Return what is known of the acceleration besides its values."""
+    pair = case.pair()
+    return {
+        "pressure_angle": pair.working_pressure_angle,
+        "mass": pair.wheels[1].mass,
+        "sampling_rate": check_rate(case.signal_rate),
+        "speed": check_speed(case.operation.top_speed),
+        "teeth": check_teeth(case.gears.teeth),
+    }
 
 
 def teeth_in_mesh(case: Case, time: float) -> list[float]:

@@ -320,7 +320,14 @@ def plain_record(
 ) -> PlainRecord:
     """Simulate a case and return its record as plain arrays, for who asks for numbers of it; see `run_case`.
 
-    A record of levels alone that is as long as its motion takes loads no xarray.
+    xarray is loaded for run-ups, and for the dataset when somebody asks for that.
+
+    Examples
+    --------
+    >>> from gearmbs.studies import Case
+    >>> record = plain_record(Case(operation={"duration": "auto"}, solver={"lump": True}), variables=["gmf_rms"])
+    >>> record.values("gmf_rms").shape, list(record.values("way"))
+    ((2, 3, 4), ['band', 'orders'])
     """
     _check(case, variables)
     return _recorded(case, progress, mechanism, variables, None)[0]
