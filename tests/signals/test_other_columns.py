@@ -33,6 +33,7 @@ def table(path, head, *columns):
     [
         ("Time,Vib,Speed,Torque,Temp", "s,m/s2,rpm,Nm,degC"), ("Time,Vib", "sec,g"), ("Zeit,Vib", "ms,mm/s"),
         ("Time,Vib,Flow,p", "s,g,l/min,mbar"), ("t,Moment,Weg", "s,kNm,µm"), ("Time,Vib,Trip,Ind", "s,g,km/h,kW"),
+        ("Run 5,A,B", "s,g,Nm"),
     ],
 )  # fmt: skip
 def test_a_row_of_units_below_the_names(tmp_path, above, names, units):
@@ -221,6 +222,12 @@ def test_tables_of_one_row_a_channel_and_words_alone_are_refused(tmp_path):
         read_signal(table(tmp_path / "l.csv", ["channel,value [g]"], names, values), rate=RATE)
     with pytest.raises(SignalFileError, match=says("w.csv", "'channel,state'")):
         read_signal(table(tmp_path / "w.csv", ["channel,state"], names, names), rate=RATE)
+    twice = np.repeat(TIME[: COUNT // 2], 2)
+    with pytest.raises(SignalFileError, match=says("'channel'", "'a', 'b'", "row to row")):
+        read_signal(table(tmp_path / "t.csv", ["t [s],channel,value [g]"], twice, names, values))
+    (tmp_path / "b.txt").write_text("t acc state\n" + "\n".join(f"{k} {0.5 * k} OK" for k in range(40)))
+    with pytest.raises(SignalFileError, match=says("b.txt", "words", "semicolons")):
+        read_signal(tmp_path / "b.txt")
 
 
 @pytest.mark.parametrize(
@@ -261,6 +268,19 @@ def test_what_is_left_out_says_what_it_holds():
     assert left["channel"].values.tolist() == ["acc"]
     for words in (says("'oil'", "60 to 60.5 °C"), says("'wind speed'", "8 m/s"), says("'p'", "pressure", "3 bar")):
         assert notes.str.contains(words).any()
+
+
+def test_temperatures_and_loads_are_columns_of_features(tmp_path):
+    path = table(
+        tmp_path / "f.csv", ["t [s],acc [g],n [rpm],oil [degC],M [N m],load [%]"], TIME, ACC, SPEED, OIL, OIL, OIL
+    )
+    wanted = {"oil.mean": OIL.mean(), "M.mean": OIL.mean(), "load.mean": OIL.mean()}
+    for settings in ({}, {"teeth": 29}):
+        row = gm.signals.series([path], **settings).iloc[0]
+        assert {name: row[name] for name in wanted} == pytest.approx(wanted, rel=1e-6)
+    alone = gm.analyse(path, channels=["acc"], speed="1500 rpm")
+    assert alone.conditions == {}
+    assert gm.analyse(path).to_frame("channel")["oil.mean"].tolist() == pytest.approx([OIL.mean()], rel=1e-6)
 
 
 @pytest.mark.parametrize(("other", "unit"), [(np.full(COUNT, 1.0), "g"), (np.full(COUNT, 1.0), "unknown"), (OIL, "mm")])

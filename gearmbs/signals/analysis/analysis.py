@@ -38,7 +38,7 @@ from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft
 from gearmbs.signals.signal.arguments import DataKeywords
 from gearmbs.signals.signal.given import contradictions, given_rate, given_speed
 from gearmbs.signals.signal.inputs import Given, Units, to_signal
-from gearmbs.signals.signal.labels import UNIT_ASKED, measured
+from gearmbs.signals.signal.labels import CONDITIONS, UNIT_ASKED, measured
 from gearmbs.signals.signal.signal import check_teeth, common_unit, make_signal, rate_of, units_of, with_metadata
 from gearmbs.signals.spectra import spectrum
 
@@ -358,6 +358,7 @@ def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOpti
         speed_range=shaft.range,
         missing=missing,
         notes=notes,
+        conditions=dict(signal.attrs.get(CONDITIONS, {})),
     )
 
 

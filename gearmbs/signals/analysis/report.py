@@ -201,6 +201,7 @@ class Reported(Protocol):
     duration: float
     notes: list[str]
     missing: dict[str, str]
+    conditions: dict[str, float]
 
     def channel_features(self) -> xr.Dataset:
         """Numbers of dimension (channel,)."""
@@ -250,6 +251,7 @@ def feature_rows(report: Reported, by: By = "record") -> list[dict[str, Any]]:
     names = [str(c) for c in data["channel"].values]
     head = {"source": report.source, "rate_hz": report.rate, "duration_s": report.duration}
     head |= {key: float(value) for key, value in report.record_features().items()}
+    head |= {f"{name}.mean": float(value) for name, value in report.conditions.items()}
     reasons = [f"{name}: {reason}" for name, reason in report.missing.items()]
     tail = {"notes": "; ".join([*(note.rstrip(".") for note in report.notes), *reasons])}
     columns = {str(key): np.asarray(value.values, dtype=float) for key, value in data.data_vars.items()}
@@ -315,6 +317,9 @@ class AnalysisReport(Shown):
         What could not be computed, and why: nothing is None or NaN throughout without an entry here.
     notes : list of str
         What a reader should know about the results.
+    conditions : dict of str to float
+        Means of the columns that say how the machine ran and are no vibration, temperatures and loads, by name, in
+        their units.
     """
 
     source: str
@@ -335,6 +340,7 @@ class AnalysisReport(Shown):
     speed_range: tuple[float, float] | None = None
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    conditions: dict[str, float] = field(default_factory=dict)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """The numbers as tables: harmonics, levels, lines, and where known sidebands, indicators and impulsive."""

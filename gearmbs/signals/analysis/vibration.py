@@ -38,6 +38,7 @@ from gearmbs.signals.rotation.order_tracking import order_track
 from gearmbs.signals.rotation.rate import MIXED, other_rate
 from gearmbs.signals.rotation.shaft import Known, Shaft, known_shaft, refined_speed, remark_plausibility
 from gearmbs.signals.rotation.sweep import remark_sweep
+from gearmbs.signals.signal.labels import CONDITIONS
 from gearmbs.signals.signal.signal import rate_of, units_of
 from gearmbs.signals.signal.units import detected_unit, unit_dimension
 from gearmbs.signals.spectra import envelope, spectrum
@@ -84,6 +85,9 @@ class VibrationReport(Shown):
         What could not be computed, and why: no attribute is None without an entry here.
     notes : list of str
         What a reader should know about the results.
+    conditions : dict of str to float
+        Means of the columns that say how the machine ran and are no vibration, temperatures and loads, by name, in
+        their units.
     """
 
     source: str
@@ -102,6 +106,7 @@ class VibrationReport(Shown):
     speed_origin: str = "not known"
     missing: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    conditions: dict[str, float] = field(default_factory=dict)
 
     @property
     def channels(self) -> list[str]:
@@ -310,6 +315,7 @@ def vibration_report(
         speed_origin=origin,
         missing=missing,
         notes=notes,
+        conditions=dict(signal.attrs.get(CONDITIONS, {})),
     )
 
 

@@ -19,11 +19,13 @@ FEWEST_ROWS = 3
 """Rows with numbers beside words that make a table: a line of a header may have both."""
 
 
-def find_beside_words(rows: Sequence[tuple[int, str]]) -> tuple[int, str, str, list[Kind]] | None:
+def find_beside_words(
+    rows: Sequence[tuple[int, str]], separators: Sequence[str | None] = (";", "\t", ",")
+) -> tuple[int, str | None, str, list[Kind]] | None:
     """Return where rows begin that hold numbers in some columns and words in others, down to the last; None of none."""
     found = None
     for separator, decimal in SEPARATIONS:
-        if separator is None or separator == decimal or len(rows) < FEWEST_ROWS:
+        if separator not in separators or separator == decimal or len(rows) < FEWEST_ROWS:
             continue
         kinds = [_kinds(line, separator, decimal) for _, line in rows]
         # the end of what is looked at may be one of a file that is cut off

@@ -158,7 +158,8 @@ def read_csv(
         clock = np.concatenate(known) if known else None
         values = np.concatenate(blocks)
         count, said = len(values), words.said()
-        if clock is None and not layout.groups and (mixed := words.mixed()) is not None:
+        rising = clock is not None and bool(np.all(np.diff(clock) > 0.0))
+        if not rising and not layout.groups and (mixed := words.mixed()) is not None:
             raise SignalFileError(path, mixed)
         if layout.groups:
             one = on_one_clock(path, values, layout.groups, layout.names, layout.units, channels, gaps)
@@ -378,7 +379,7 @@ def _blocks(
     width, first, separator = len(layout.names), layout.first, layout.separator
     size = path.stat().st_size
     refuse = checked_gaps(gaps) == "refuse"
-    words = (*layout.stamps, *layout.beside)
+    words, slow = (*layout.stamps, *layout.beside), layout.slow
     kinds: dict[int, Any] = {i: str if i in words else float for i in range(width)}
     try:
         with _open_text(path, packed) as (text, raw):
@@ -405,7 +406,7 @@ def _blocks(
                 numbers = block.drop(columns=list(words)) if words else block
                 values = np.full((len(block), width), np.nan)
                 values[:, numbers.columns] = numbers.to_numpy()
-                wanted = [i for i in range(width) if i not in {*words, *layout.empty, *layout.slow}]
+                wanted = [i for i in range(width) if i not in {*words, *layout.empty, *slow}]
                 if refuse and not np.isfinite(values[:, wanted]).all():
                     raise ValueError("missing values")
                 yield values, stamped, min(1.0, raw.tell() / size)

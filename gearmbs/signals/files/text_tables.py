@@ -234,9 +234,12 @@ def _find_numbers(head: list[str], path: Path) -> tuple[int, str | None, str, li
     sample = next((line.strip() for line in head if line.strip()), "")
     if not sample:
         raise SignalFileError(path, "holds nothing but empty lines")
+    apart = find_beside_words(rows, (None,)) is not None
+    words = "; rows hold numbers beside words, which need commas, semicolons or tabs between columns" if apart else ""
     raise SignalFileError(
         path,
-        f"holds no row of numbers in its first {len(head)} lines; it begins with {sample[:60]!r}{of_adams(path)}",
+        f"holds no row of numbers in its first {len(head)} lines{words}; it begins with {sample[:60]!r}"
+        f"{of_adams(path)}",
     )
 
 
@@ -327,10 +330,11 @@ def _units_row(
     if len(upper) == width and all(map(is_unit_of_column, upper)) and not any(map(is_unit_of_column, plain)):
         # units above the names
         return plain, upper
-    if len(upper) == width > 1 and is_clock(upper[0]) and plain[0].lower() in SECONDS:
+    if len(upper) == width > 1 and plain[0].lower() in SECONDS and not any(is_number(cell, ".") for cell in upper):
         # below the time its unit: so are the others those of their columns, also units of no vibration
         others = [unit for unit in plain[1:] if unit]
-        if 2 * sum(is_unit_of_column(unit) or is_unit(unit) for unit in others) >= max(1, len(others)):
+        known = sum(is_unit_of_column(unit) or is_unit(unit) for unit in others)
+        if 2 * known >= max(1, len(others)) if is_clock(upper[0]) else all(map(is_unit_of_column, others)):
             return upper, [unit or UNKNOWN_UNITS for unit in plain]
     counted = bool(upper) and upper[0].strip().lower() in INDEX_NAMES and any(plain)
     stated = (plain[0] or counted) and all(not unit or is_unit_of_column(unit) for unit in plain)

@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.signals.errors import MissingMetadataError, SignalError
-from gearmbs.signals.signal.loads import LOAD_WORDS, SLOW_LOADS, is_unit_of_load, load_of, perhaps
+from gearmbs.signals.signal.loads import LOAD_WORDS, is_slow_load, is_unit_of_load, load_of, perhaps
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, shaft_coords, units_of, with_metadata
 from gearmbs.signals.signal.times import SECONDS, SUFFIX
 from gearmbs.signals.signal.units import detected_unit, is_usual, scaled, unit_dimension
@@ -97,6 +97,8 @@ WORDS: dict[str, str] = {
 }
 
 
+CONDITIONS = "conditions"
+"""Attribute of a signal: means of the columns that say how the machine ran, by name."""
 TOLD_RANGES = ("temperature", "travel")
 """Of these, as of loads, the report says between what they were."""
 
@@ -143,7 +145,7 @@ def is_unit_of_column(text: str) -> bool:
 
 def may_be_slow(name: str, unit: str) -> bool:
     """Return whether a column may have fewer samples than vibration beside it, and is interpolated then."""
-    return role_of(name, unit) in SLOW_ROLES or load_of(name, unit) in SLOW_LOADS
+    return role_of(name, unit) in SLOW_ROLES or is_slow_load(name, unit)
 
 
 def is_clock(name: str) -> bool:
@@ -375,4 +377,8 @@ def measured(
         f"{n!r} {words[n]}{ranges.get(n, '')} and is not analysed as vibration." for n in left_out if n != used_speed
     ]
     left = signal.sel(channel=[name for name in names if name not in left_out or name == used_speed])
-    return with_metadata(left, notes=[*left.attrs.get("notes", ()), *notes]), used_speed
+    told_by = {
+        n: float(np.nanmean(v)) for n, _, v in columns if n in left_out and (n in ranges or told.get(n) == "share")
+    }
+    means = {CONDITIONS: told_by} if told_by else {}
+    return with_metadata(left, notes=[*left.attrs.get("notes", ()), *notes], **means), used_speed

@@ -11,8 +11,6 @@ from gearmbs.signals.signal.units import COUNTS, unit_dimension
 from gearmbs.signals.signal.words import words_of
 
 Load = Literal["torque", "force", "current", "power", "pressure"]
-SLOW_LOADS = ("torque", "current", "power", "pressure")
-"""Columns of these may have fewer samples than vibration; forces are measured as it is."""
 LOAD_WORDS: dict[Load, str] = {
     "torque": "holds a torque", "force": "holds a force", "current": "holds a current", "power": "holds a power",
     "pressure": "holds a pressure",
@@ -37,7 +35,7 @@ NAMES: dict[Load, str] = {
     "force": r"force|kraft|effort|sila|fuerza|forza|kraftmessdose",
     "current": r"current|strom|courant|proud|corriente|corrente",
     "power": r"power|leistung|puissance|vykon|potencia|potenza",
-    "pressure": r"pressure|press|druck|pression|tlak|presion|pressione",
+    "pressure": r"pressure|druck|pression|tlak|presion|pressione",
 }
 """Without case and accents."""
 BESIDE = (
@@ -86,6 +84,14 @@ def load_of(name: str, unit: str) -> Load | None:
         except SignalError:
             return None
     return "force" if words[:2] == _LOAD_CELL else _called(words)
+
+
+def is_slow_load(name: str, unit: str) -> bool:
+    """Return whether a column holds a load that may have fewer samples than vibration; forces are measured as it is."""
+    unit = unit.strip()
+    if is_unit_of_load(unit) or unit in UNITS:
+        return True
+    return (_says_nothing(unit) or unit == "Pa") and load_of(name, unit) not in (None, "force")
 
 
 def _called(words: Sequence[str]) -> Load | None:
