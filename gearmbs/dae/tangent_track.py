@@ -47,8 +47,12 @@ class Track(Struct):
         The integer table before the last change.
     table : ndarray of int64
         Scratch of the same size.
-    error, largest : ndarray, shape (p, n)
-        Largest local error and largest value of each sensitivity.
+    error, largest, local : ndarray, shape (p, n)
+        Largest local error and largest value of each sensitivity, and its local error in the last step tried.
+    tested : ndarray, shape (n,)
+        1 over the typical magnitude of unknowns under error control, 0 of others.
+    allowed : ndarray, shape (p,)
+        Local error of a step that is allowed, in typical magnitudes.
     most_rate, watched : ndarray, shape (n,)
         Largest rate of each unknown so far; 1 for those whose rates are looked at for jumps, else 0.
     between, first_seen, seen_between, last_seen : ndarray, shape (n,)
@@ -72,6 +76,7 @@ class Track(Struct):
     growth_limit: float
     gamma: float  # of the matrix that is factored
     looked: float  # time at which it was, s
+    over: float  # largest local error of the last step tried, as part of what is allowed
     times: Vector
     y: Matrix
     s: Matrix
@@ -96,6 +101,9 @@ class Track(Struct):
     table: IntVector
     error: Matrix
     largest: Matrix
+    local: Matrix
+    tested: Vector
+    allowed: Vector
     most_rate: Vector
     watched: Vector
     between: Vector

@@ -29,13 +29,14 @@ from typing import Any
 import numpy as np
 from numba import float64, int64
 
-from gearmbs.dae.integrators.bdf import HISTORY, MAX_ORDER, error_constant
+from gearmbs.dae.integrators.bdf import HISTORY, error_constant
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, SingularMatrixError, analyse
 from gearmbs.dae.linalg.several import SIDES, solve_sides
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, GROWTH_LIMIT, factor, new_factors, solve
 from gearmbs.dae.problem import EPS, HISTORY_CHANGED, DAEProblem, ModelError
-from gearmbs.dae.result import DAEResult, DenseOutput, lagrange_weights
+from gearmbs.dae.result import DAEResult, lagrange_weights
 from gearmbs.dae.tangent_jumps import look_for_jumps
+from gearmbs.dae.tangent_points import AFRESH, END_OF_STEP, SHORT, points_of, shorter
 from gearmbs.dae.tangent_track import TRACK_TYPE, Track, size_of_move, slot_of
 from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
@@ -48,13 +49,10 @@ NOTHING, ROUGH = 1e2 * EPS / BY, 1e-2
 """Part of an unknown's largest value, or typical magnitude, up to which its sensitivity may be rounding: the residual
 is rounded to EPS of its terms, which are moved by `BY`, and steps add up to some of it. It is if it is rough, too:
 local errors are more than that part of it."""
-GROWTH, GROWING_ORDER = 1.4, 3
-"""Ratio of a step to the one before it, and order, with which steps grow behind a restart: for ever at this ratio the
-formula of order three is stable up to 1.53, that of order four up to 1.28."""
-EVEN, EVEN_ORDER = 0.99, 4
-"""Part of the longest step allowed from which one was limited by that, and the order taken there."""
-SHORTER = 0.25
-"""Ratio of a step of order one to the one before it from which a run has started afresh."""
+DIVIDED_ORDER = 3
+"""Order of the formula within steps that a first division has not made short enough: there second derivatives jump."""
+SHORTEST = 1e-3
+"""Part of a step of the run below which none is divided further: equations that jump there are as wrong in any step."""
 TOGETHER = 3
 """Steps that are looked at for jumps at once."""
 FEW = 2
@@ -72,9 +70,6 @@ JUMPS = (
 JUMP_COUNTS = 1e-3
 """Part of the largest sensitivity of an unknown by which a jump that is not followed may falsify it: what the steps
 leave of it is as much."""
-END_OF_STEP, AFRESH = 1, 2
-"""Flags of a point: it ends a step of the run; no point before it but the last counts."""
-
 SCRATCH = (
     "plus", "minus", "yp_moved", "rate", "found", "most_rate", "between", "first_seen", "seen_between", "last_seen"
 )  # fmt: skip
@@ -129,7 +124,7 @@ def _foretell(functions, tr, k, past, p, side, y, yp, idata, rdata, work):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
+def _step(functions, tr, plan, factors, t, k, y, yp, may_be_refused, idata, rdata, work):
     """Find the sensitivities at ``t`` by the order-k formula.
 
     The history has been moved back by one point: what is sought stands in the newest slot.
@@ -143,13 +138,15 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
     k : int
     y, yp : ndarray, shape (n,)
         The run there.
+    may_be_refused : bool
+        Whether a local error that is not allowed refuses the step.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
 
     Returns
     -------
     served : bool
-        Whether the pivots do.
+        Whether the pivots do, and the local error is allowed: ``tr.over`` is more than 1 if it is not.
     """
     n, count = tr.scale.shape[0], tr.parameters
     times, s, nodes = tr.times, tr.s, tr.nodes
@@ -160,7 +157,7 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
     lagrange_weights(t, nodes, k + 1, tr.value, tr.slope)
     slope = tr.slope
     gamma = slope[0]
-    tr.gamma, tr.looked = gamma, t
+    tr.gamma, tr.looked, tr.over = gamma, t, 0.0
     functions.jacobian(t, y, yp, gamma, tr.vals, idata, rdata, work)
     growth = factor(plan, factors, tr.vals)
     if not growth <= tr.growth_limit:
@@ -175,7 +172,8 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
             if m != j:
                 w *= (t - nodes[m]) / (nodes[j] - nodes[m])
         tr.value[j] = w
-    told = error_constant(t, nodes, k) if past > k else 0.5
+    # of the first steps behind a start, of which as many past points tell as the formula takes, nothing is known
+    told = error_constant(t, nodes, k) if past > k else 0.0
     for begin in range(0, count, SIDES):
         end = min(begin + SIDES, count)
         for p in range(begin, end):
@@ -190,10 +188,19 @@ def _step(functions, tr, plan, factors, t, k, y, yp, idata, rdata, work):
                 solve(plan, factors, tr.sides[side], tr.sides[side])
         for p in range(begin, end):
             found, new = tr.sides[p - begin], slot_of(tr, 0) * count + p
+            most = 0.0
             for i in range(n):
-                tr.error[p, i] = max(tr.error[p, i], told * abs(found[i] - s[new, i]))
+                tr.local[p, i] = told * abs(found[i] - s[new, i])
+                most = max(most, tr.tested[i] * tr.local[p, i])
                 s[new, i] = found[i]
-                tr.largest[p, i] = max(tr.largest[p, i], abs(found[i]))
+            tr.over = max(tr.over, most / tr.allowed[p])
+    if tr.over > 1.0 and may_be_refused:
+        return False
+    for p in range(count):
+        new = slot_of(tr, 0) * count + p
+        for i in range(n):
+            tr.error[p, i] = max(tr.error[p, i], tr.local[p, i])
+            tr.largest[p, i] = max(tr.largest[p, i], abs(s[new, i]))
     return True
 
 
@@ -294,7 +301,8 @@ def follow_run(
                 tr.y[j, i] = tr.y[j - 1, i]
         tr.newest = slot_of(tr, HISTORY - 1)
         k = min(orders[m], past)
-        if not _step(functions, tr, plan, factors, looked[m], k, y[m], yp[m], idata, rdata, work):
+        may_be_refused = flags[m] & SHORT == 0
+        if not _step(functions, tr, plan, factors, looked[m], k, y[m], yp[m], may_be_refused, idata, rdata, work):
             for j in range(past):
                 tr.times[j] = tr.times[j + 1]
                 for i in range(n):
@@ -370,66 +378,13 @@ class Followed:
     error: np.ndarray
 
 
-def points_of(sol: DenseOutput, longest: float = np.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times, orders and flags of the points at which a run is followed.
-
-    These are the ends of its steps. Where it starts afresh, long steps behind short ones are divided, so that the
-    order can grow from one as it does at the start of a run. Steps as long as ``longest`` allows are even and say
-    nothing of the order: a motion at rest has the first one. There it grows by itself.
-    """
-    nodes, step_orders = sol.stored()
-    steps = np.flatnonzero(step_orders > 0)
-    ends, step_orders = nodes[steps], step_orders[steps].astype(np.int64)
-    sizes = np.diff(ends, prepend=nodes[steps[0] - 1])
-    even = sizes > EVEN * longest
-    # of all other steps times and orders are those of the run, once the order has grown
-    notable = np.append(np.flatnonzero((step_orders == 1) | even), ends.size)
-    times: list[np.ndarray] = []
-    orders: list[np.ndarray] = []
-    flags: list[np.ndarray] = []
-    before, size, allowed, growing, at = 0, np.inf, 1, False, 0
-    while at < ends.size:
-        if not growing and allowed >= MAX_ORDER:
-            until = int(notable[np.searchsorted(notable, at)])
-            if until > at:
-                times.append(ends[at:until])
-                orders.append(np.minimum(step_orders[at:until], MAX_ORDER))
-                flags.append(np.full(until - at, END_OF_STEP))
-                size, before, at = float(sizes[until - 1]), int(step_orders[until - 1]), until
-                continue
-        end, h, order = float(ends[at]), float(sizes[at]), int(step_orders[at])
-        if even[at]:
-            order = max(order, min(EVEN_ORDER, before + 1))
-        afresh = order == 1 and (before != 1 or h < SHORTER * size)
-        growing |= afresh
-        inner, last_piece = np.array([end]), h
-        if not afresh and growing and h > GROWTH * size:
-            number = int(np.ceil(np.log1p((GROWTH - 1.0) * h / (GROWTH * size)) / np.log(GROWTH)))
-            pieces = GROWTH ** np.arange(number, dtype=float)
-            inner = np.append((end - h + h * np.cumsum(pieces) / pieces.sum())[:-1], end)
-            last_piece = h * float(pieces[-1] / pieces.sum())
-        elif not afresh and allowed >= min(order, GROWING_ORDER):
-            growing = False
-        allowed = 0 if afresh else allowed
-        grown = []
-        for _ in inner:
-            allowed = min(allowed + 1, GROWING_ORDER if growing else MAX_ORDER)
-            grown.append(allowed if growing else min(allowed, order))
-        flag = np.full(inner.size, AFRESH if afresh else 0)
-        flag[-1] |= END_OF_STEP
-        times.append(inner)
-        orders.append(np.array(grown))
-        flags.append(flag)
-        size, before, at = last_piece, order, at + 1
-    return np.concatenate(times), np.concatenate(orders).astype(np.int64), np.concatenate(flags).astype(np.int64)
-
-
 def follow(
     problem: DAEProblem,
     result: DAEResult,
     directions: list[Direction],
     longest: float = np.inf,
     jumps: bool = True,
+    local_error: float | None = None,
 ) -> Followed:
     """Return the sensitivities of a run at its outputs.
 
@@ -446,63 +401,112 @@ def follow(
     jumps : bool
         Whether jumps are looked for, which takes as long as all the rest with few directions. Without, what they add
         is missing in silence: for matrices whose worth shows by itself, as Newton's.
+    local_error : float, optional
+        Local error of a step that is allowed, as in `Followed`: where it is larger at the steps of the run these are
+        divided. Default: whatever they leave.
 
     Raises
     ------
     ModelError
         If the equations for the sensitivities have no unique solution; if these jump, which is not followed.
     """
-    n, count = problem.n, len(directions)
-    sol = result.sol
-    assert sol is not None
-    times, orders, flags = points_of(sol, longest)
-    run = sol.polynomials()
-    # where the run starts afresh the equations may have jumped already
-    before_jump = np.append(flags[1:] & AFRESH != 0, False)
-    looked = np.where(before_jump, np.nextafter(times, -np.inf), times)
-    tr = _track(problem, directions, jumps)
-    tr.times[0] = sol.t_min
-    tr.y[0] = problem.y0
-    for p, direction in enumerate(directions):
-        tr.s[p] = direction.start
-    outputs = np.ascontiguousarray(result.t)
-    s_out, sp_out = np.zeros((outputs.size * count, n)), np.zeros((outputs.size * count, n))
-    hook = problem.hook if problem.hook is not None else no_hook
-    bound = bind(problem.residual, problem.jacobian, hook, no_events)
-    idata, rdata, work = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
-    plan: Any = None
-    factors: Any = None
-    largest = tr.scale.copy()
-    for begin in range(0, times.size, CHUNK):
-        part = slice(begin, begin + CHUNK)
-        y, yp = run.evaluate(times[part])
-        largest = np.maximum(largest, np.abs(y).max(axis=0))
-        args = [np.ascontiguousarray(a[part]) for a in (times, looked, orders, flags)]
-        at = 0
-        while at < y.shape[0]:
-            fresh = plan is None
-            if fresh:
-                plan, factors = _plan_at(problem, tr, args, at, y, yp, idata, rdata, work)
-            reached = direct(follow_run)(
-                bound, tr, plan, factors, at, *args, y, yp, outputs, s_out, sp_out, idata, rdata, work
-            )
-            if reached == at and fresh:
-                raise ModelError(NO_SOLUTION.format(args[0][at]))
-            if reached < y.shape[0]:
-                plan = None
-            at = reached
+    assert result.sol is not None
+    points = points_of(result.sol, longest)
+    first = _Following(problem, result, directions, jumps)
+    followed = first.through(*points)
     for p, direction in enumerate(directions):
         # what does not change has its rounding beside it
-        least = BY * (tr.largest[p] / tr.scale).max() * tr.scale
-        if (tr.lost[p] > JUMP_COUNTS * np.maximum(tr.largest[p], least)).any():
-            raise ModelError(JUMPS.format(direction.name, tr.lost_at[p]))
-    tested = np.asarray(problem.error_mask, dtype=float) / tr.scale
-    most = (tr.largest * tested).max(axis=1, initial=0.0)
-    error = (tr.error * tested).max(axis=1, initial=0.0) / np.where(most > 0.0, most, 1.0)
-    depends = ((tr.largest > NOTHING * largest) & (tested > 0.0)).any(axis=1)
-    error[~depends & (error > ROUGH)] = 0.0
-    shape = (outputs.size, count, n)
-    return Followed(s_out.reshape(shape).swapaxes(0, 1), sp_out.reshape(shape).swapaxes(0, 1), error)
+        least = BY * (first.tr.largest[p] / first.tr.scale).max() * first.tr.scale
+        if (first.tr.lost[p] > JUMP_COUNTS * np.maximum(first.tr.largest[p], least)).any():
+            raise ModelError(JUMPS.format(direction.name, first.tr.lost_at[p]))
+    if local_error is None or not (followed.error > local_error).any():
+        return followed
+    again = _Following(problem, result, directions, False)
+    again.tr.allowed[:] = np.where(followed.error > 0.0, local_error * first.most, np.inf)
+    return again.through(*points)
+
+
+class _Following:
+    """Where the compiled loop along a run stands, and what it is handed."""
+
+    def __init__(self, problem: DAEProblem, result: DAEResult, directions: list[Direction], jumps: bool) -> None:
+        assert result.sol is not None
+        self.problem, self.run = problem, result.sol.polynomials()
+        self.tr = _track(problem, directions, jumps)
+        self.tr.times[0], self.tr.y[0] = self.run.t_min, problem.y0
+        for p, direction in enumerate(directions):
+            self.tr.s[p] = direction.start
+        self.outputs = np.ascontiguousarray(result.t)
+        self.found = tuple(np.zeros((self.outputs.size * len(directions), problem.n)) for _ in range(2))
+        hook = problem.hook if problem.hook is not None else no_hook
+        self.bound = bind(problem.residual, problem.jacobian, hook, no_events)
+        self.tables = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
+        self.plan: Any = None
+        self.factors: Any = None
+
+    @property
+    def most(self) -> np.ndarray:
+        """Largest sensitivity of unknowns under error control, as part of their typical magnitudes, by parameter."""
+        return (self.tr.largest * self.tr.tested).max(axis=1, initial=0.0)
+
+    def through(self, times: np.ndarray, orders: np.ndarray, flags: np.ndarray) -> Followed:
+        """Follow the run through all points, as of `points_of`."""
+        # where the run starts afresh the equations may have jumped already
+        before_jump = np.append(flags[1:] & AFRESH != 0, False)
+        looked = np.where(before_jump, np.nextafter(times, -np.inf), times)
+        largest = self.tr.scale.copy()
+        for begin in range(0, times.size, CHUNK):
+            points = [np.ascontiguousarray(a[begin : begin + CHUNK]) for a in (times, looked, orders, flags)]
+            y, yp = self.run.evaluate(points[0])
+            largest = np.maximum(largest, np.abs(y).max(axis=0))
+            at = 0
+            while at < y.shape[0]:
+                at = self.advance(at, points, y, yp)
+                if at < y.shape[0] and self.tr.over > 1.0:
+                    self.divide(*(a[at] for a in points))
+                    at += 1
+        most = self.most
+        error = (self.tr.error * self.tr.tested).max(axis=1, initial=0.0) / np.where(most > 0.0, most, 1.0)
+        depends = ((self.tr.largest > NOTHING * largest) & (self.tr.tested > 0.0)).any(axis=1)
+        error[~depends & (error > ROUGH)] = 0.0
+        shape = (self.outputs.size, self.tr.parameters, self.problem.n)
+        s, sp = (one.reshape(shape).swapaxes(0, 1) for one in self.found)
+        return Followed(s, sp, error)
+
+    def advance(self, at: int, points: list[np.ndarray], y: np.ndarray, yp: np.ndarray) -> int:
+        """Follow the run from one of some points on; return how many are done, fewer where a step is too long."""
+        while at < y.shape[0]:
+            fresh = self.plan is None
+            if fresh:
+                self.plan, self.factors = _plan_at(self.problem, self.tr, points, at, y, yp, *self.tables)
+            known = self.bound, self.tr, self.plan, self.factors
+            reached = direct(follow_run)(*known, at, *points, y, yp, self.outputs, *self.found, *self.tables)
+            if reached < y.shape[0]:
+                if self.tr.over > 1.0:
+                    return reached
+                if reached == at and fresh:
+                    raise ModelError(NO_SOLUTION.format(points[0][at]))
+                self.plan = None
+            at = reached
+        return at
+
+    def divide(self, end: float, looked: float, order: int, flag: int) -> None:
+        """Follow the run to the end of a step that is too long, in shorter ones."""
+        t = float(self.tr.times[0])
+        whole = end - t
+        h, order, flag = whole, int(order), int(flag)
+        while t < end:
+            h = min(shorter(h, self.tr.over, order), end - t)
+            # what is left over is no step of its own
+            last = end - t < (1.0 + SHORTEST) * h
+            to = end if last else t + h
+            short = SHORT if to - t <= SHORTEST * whole else 0
+            flags = flag & AFRESH | (flag & END_OF_STEP if last else 0) | short
+            points = [np.array([to]), np.array([looked if last else to]), np.array([order]), np.array([flags])]
+            if self.advance(0, points, *self.run.evaluate(points[0])):
+                t, flag = to, flag & END_OF_STEP
+            else:
+                order = min(order, DIVIDED_ORDER)
 
 
 def _plan_at(problem, tr, args, at, y, yp, idata, rdata, work):
@@ -539,6 +543,7 @@ def _track(problem: DAEProblem, directions: list[Direction], jumps: bool) -> Tra
         growth_limit=GROWTH_LIMIT,
         gamma=0.0,
         looked=0.0,
+        over=0.0,
         times=np.zeros(HISTORY),
         y=np.zeros((HISTORY, n)),
         s=np.zeros((HISTORY * count, n)),
@@ -555,6 +560,9 @@ def _track(problem: DAEProblem, directions: list[Direction], jumps: bool) -> Tra
         table=np.zeros(len(problem.idata), dtype=np.int64),
         error=np.zeros((count, n)),
         largest=np.zeros((count, n)),
+        local=np.zeros((count, n)),
+        tested=np.asarray(problem.error_mask, dtype=float) / np.asarray(problem.scale, dtype=float),
+        allowed=np.full(count, np.inf),
         watched=np.asarray(problem.error_mask & problem.differential, dtype=float),
         lost=np.zeros((count, n)),
         lost_at=np.zeros(count),

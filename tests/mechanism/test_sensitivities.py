@@ -291,3 +291,51 @@ def test_what_depends_on_nothing_of_a_parameter_has_no_error():
     run = forward_sensitivities(pendulum, {"mass": 3.0, "length": 1.0}, 1.0, rate=50)
     assert run.local_error["mass"] == 0.0
     assert 0.0 < run.local_error["length"] < 1e-5
+
+
+def test_sensitivities_have_a_local_error_of_their_own():
+    """Teeth bend the derivatives where they leave the run as it is: steps are divided there, for each parameter."""
+    case = Case(operation={"speed": "1000 rpm", "torque": 100.0, "run_up": 0.002, "settling": 0.0, "duration": 0.01})
+
+    def geared(torque):
+        return case_mechanism(case.changed(operation={"torque": torque}))
+
+    def force_by_torque(tol, **asked):
+        run = forward_sensitivities(
+            geared, {"torque": 100.0}, 0.004, rate=20_000, tol=tol, rate_scale=1700.0, lump=True, **asked
+        )
+        force = run.derivative("torque", lambda s: s.diagnostics("mesh")["normal_force"])
+        return force, run.local_error["torque"], run.solution.result.stats.steps
+
+    best, _, _ = force_by_torque(1e-10, local_error=1e-6)
+    (usual, told, steps), (better, less, same) = force_by_torque(1e-8), force_by_torque(1e-8, local_error=1e-5)
+    assert less <= 1e-5 < told
+    assert steps == same
+    errors = [np.sqrt(np.mean((found - best) ** 2)) for found in (usual, better)]
+    assert errors[1] < 0.4 * errors[0]
+
+
+@pytest.mark.parametrize("asked", [1e-7, 1e-8])
+def test_divided_steps_go_through_changes_of_angles(asked):
+    """A free body that flips over: its angular momentum by its first spin stays that of the start."""
+    moments = np.array([1.2, 2.0, 3.0])
+
+    def body(spin):
+        made = gm.Mechanism("free", gravity=(0, 0, 0))
+        made.body("body", mass=1.0, inertia=tuple(moments), angular_velocity=(0.05, spin, 0.02))
+        return made
+
+    run = forward_sensitivities(body, {"spin": 3.0}, 8.0, rate=50, tol=1e-6, local_error=asked)
+    assert len(run.solution.result.epochs) > 1
+    assert run.local_error["spin"] <= asked
+
+    def momentum(s):
+        turn, omega = s.orientation("body"), s.angular_velocity("body")
+        return np.einsum("tij,j,tkj,tk->ti", turn, moments, turn, omega)
+
+    assert run.derivative("spin", momentum) == pytest.approx(np.tile([0.0, 2.0, 0.0], (401, 1)), abs=5e-4)
+
+
+def test_a_local_error_that_is_not_positive_is_refused():
+    with pytest.raises(ModelError, match=says("local_error", "0", "positive")):
+        forward_sensitivities(oscillator, VALUES, 1.0, local_error=0.0)

@@ -131,6 +131,7 @@ def forward_sensitivities(
     tol: float | None = None,
     rate_scale: float | None = None,
     lump: bool | None = None,
+    local_error: float | None = None,
     **options: Unpack[SensitivityOptions],
 ) -> Sensitivities:
     """Simulate a mechanism and differentiate the run by parameters of it.
@@ -147,6 +148,9 @@ def forward_sensitivities(
         As of `gearmbs.mechanism.simulate`, with an integrator that has dense output.
     tol : float, optional
         Of the run; default a tenth of that of `gearmbs.mechanism.simulate`: derivatives are less smooth than the run.
+    local_error : float, optional
+        Local error of a step of the derivatives that is allowed, as in `Sensitivities`: steps of the run that leave
+        more are divided. Default: what they leave, which is told.
 
     Returns
     -------
@@ -156,13 +160,13 @@ def forward_sensitivities(
     ------
     ModelError
         If the run fails; if a parameter changes what the model is made of; if forces jump at a time that depends on it,
-        so that derivatives do; if an option is of another kind of run.
+        so that derivatives do; if an option is of another kind of run; if ``local_error`` is not positive.
 
     Notes
     -----
     Of S parameters the cost beside the run is that of a Jacobian and a factorisation, and of S + 1 residuals and
-    S substitutions, and five residuals more by which jumps are looked for, for each step. Contact and friction here are
-    continuous.
+    S substitutions, and five residuals more by which jumps are looked for, for each step. With ``local_error`` it is
+    that once more but for the jumps, and what is divided. Contact and friction here are continuous.
     """
     for option in WITHOUT:
         if option in options:
@@ -173,6 +177,8 @@ def forward_sensitivities(
         raise ModelError(f"integrator: {name!r} does not keep its steps for sensitivities; choose {able}")
     values, scales = values_and_scales(parameters)
     start, end = quantity(t_start, "time", "t_start"), quantity(t_end, "time", "t_end")
+    if local_error is not None and not local_error > 0.0:
+        raise ModelError(f"local_error = {local_error:g}: it must be positive, a part of the largest value as 1e-4")
     mechanism = built(build, values)
     usual, rate_scale = chosen_accuracy(mechanism, (start, end), tol, rate_scale)
     tol = TIGHTER * usual if tol is None else usual
@@ -194,7 +200,7 @@ def forward_sensitivities(
         by = MOST * scales[key]
         plus, minus = made(key, value + by)[1], made(key, value - by)[1]
         directions.append(direction_of(key, solution.problem, plus, minus, 2.0 * by / scales[key]))
-    followed: Followed = follow(solution.problem, solution.result, directions)
+    followed: Followed = follow(solution.problem, solution.result, directions, local_error=local_error)
     unknowns = {key: followed.s[p] / scales[key] for p, key in enumerate(values)}
     rates = {key: followed.sp[p] / scales[key] for p, key in enumerate(values)}
 
