@@ -17,7 +17,7 @@ from gearmbs.dae.equations.unknowns import I3, Counts, offsets
 from gearmbs.dae.model.builder import TableBuilder
 from gearmbs.dae.model.model import STATE_IMPLICIT, Configuration, Names
 from gearmbs.dae.model.system import System
-from gearmbs.dae.problem import INPUT, PARAMETER, ModelError, Place
+from gearmbs.dae.problem import INPUT, PARAMETER, ModelError, Number, Place
 from gearmbs.mechanism.checks import row_order
 from gearmbs.mechanism.language.syntax import NamedNumber, Scope
 from gearmbs.mechanism.parts import elements as el
@@ -399,24 +399,25 @@ class _Compiler:
         for what, setting in made.settings.items():
             first = row[T.FORCE_REXTRA]
             every = ((setting.at, setting.factor, setting.offset), *setting.others)
-            places = [Place(first + at, factor=f, offset=c, table=T.H_R_EXTRA) for at, f, c in every]
-            self.check_free(f"{name}.{what}", name)
-            self.builder.add_setting(f"{name}.{what}", setting.unit, places, allowed=setting.allowed)
+            places = tuple(Place(first + at, factor=f, offset=c, table=T.H_R_EXTRA) for at, f, c in every)
+            label = self.free(f"{name}.{what}", name)
+            self.builder.numbers[label] = Number(label, setting.unit, PARAMETER, places, allowed=setting.allowed)
         for what, number in made.given.items():
             kind, at = functions[len(functions) - len(made.times) + number]
             if kind in SETTLED:
                 place = Place(at + SETTLED[kind], table=T.H_R_FUNCTION)
-                self.check_free(f"{name}.{what}", name)
-                self.builder.add_setting(f"{name}.{what}", "N*m", [place], loads=True)
+                label = self.free(f"{name}.{what}", name)
+                self.builder.numbers[label] = Number(label, "N*m", PARAMETER, (place,), loads=True)
 
-    def check_free(self, number: str, element: str) -> None:
-        """Raise a ModelError if an input or a parameter has the name of a number of an element."""
+    def free(self, number: str, element: str) -> str:
+        """Return the name of a number of an element; raise a ModelError if an input or a parameter has it, too."""
         spelt = self._spelt.get(number.upper())
         if spelt is not None:
             kind = self.builder.numbers[spelt].kind
             raise ModelError(
                 f"{kind} {spelt!r}: '{element}' has a number of this name; choose another, or let the {kind} be it"
             )
+        return number
 
     def add_reaction(self, joint: jt.Joint) -> None:
         """Make the force and moment of a joint on its I marker's body unknowns."""

@@ -18,7 +18,7 @@ from gearmbs.dae.equations.expressions.opcodes import HEAD_ALGEBRAIC_LIST
 from gearmbs.dae.equations.loads.forces import FRAME_COLUMNS, Diagnostic
 from gearmbs.dae.equations.unknowns import Counts
 from gearmbs.dae.model.model import Model, Names
-from gearmbs.dae.problem import ANY, INPUT, PARAMETER, Allowed, Number, Place
+from gearmbs.dae.problem import INPUT, Number, Place
 
 
 class TableBuilder:
@@ -125,12 +125,6 @@ class TableBuilder:
         at = len(self.extra_r)
         self.extra_r.extend([0.0, value, 0.0] if kind == INPUT else [value])
         self.numbers[name] = Number(name, unit, kind, (Place(at, 2 if kind == INPUT else 0, table=T.H_R_EXTRA),))
-
-    def add_setting(
-        self, name: str, unit: str, places: Iterable[Place], loads: bool = False, allowed: Allowed = ANY
-    ) -> None:
-        """Add a number of an element, see `Number`."""
-        self.numbers[name] = Number(name, unit, PARAMETER, tuple(places), loads=loads, allowed=allowed)
 
     def add_place(self, name: str, place: Place, row: str | None = None) -> None:
         """Note a further place of a number, and the constraint row whose function it is if it is one."""
