@@ -82,10 +82,10 @@ class timed:
         self.spent: list[float] = []
 
     def __enter__(self) -> list[float]:
-        def call(*args: Any) -> Any:
+        def call(*args: Any, **options: Any) -> Any:
             begin = time.process_time()
             try:
-                return self.function(*args)
+                return self.function(*args, **options)
             finally:
                 self.spent.append(time.process_time() - begin)
 
