@@ -120,3 +120,25 @@ def test_a_speed_that_is_off_is_calibrated_by_the_mesh_line(swing, share):
     far = abs(share) * 575.0 * 3.0 > 2.0
     assert any(note.startswith("CHECK THE SPEED") for note in report.notes) == far
     assert report.speed == pytest.approx(np.pi / 30 * rpm.mean(), rel=5e-5)
+
+
+@pytest.mark.parametrize("beside", [0.004, 0.015])
+@pytest.mark.parametrize("height", [1.0, 3.0])
+def test_a_foreign_line_beside_the_mesh_is_not_taken_for_it(beside, height):
+    """The column is right: its lines keep their heights, whatever stands 0.4 or 1.5 % beside them."""
+    t = np.arange(64000) / 12800.0
+    angle = 2 * np.pi * 25.0 * t
+    noise = 0.1 * np.random.default_rng(1).standard_normal(t.size)
+    values = 2 * np.cos(23 * angle) + np.cos(46 * angle) + height * 2 * np.cos(23 * (1 + beside) * angle) + noise
+    report = analyse(pd.DataFrame({"time": t, "acc [m/s^2]": values, "speed [rpm]": np.full(t.size, 1500.0)}), 23)
+    np.testing.assert_allclose(report.harmonics["orders"].values[:2, 0], [np.sqrt(2.0), np.sqrt(0.5)], rtol=0.05)
+
+
+def test_a_foreign_line_alone_beside_a_told_speed_is_said_and_not_taken():
+    """No mesh line, but one 1.5 % off it: the column is kept, and the line is named."""
+    t = np.arange(64000) / 12800.0
+    values = np.cos(23 * 1.015 * 2 * np.pi * 25.0 * t) + 0.1 * np.random.default_rng(1).standard_normal(t.size)
+    report = analyse(pd.DataFrame({"time": t, "acc [m/s^2]": values, "speed [rpm]": np.full(t.size, 1500.0)}), 23)
+    assert report.speed == pytest.approx(50.0 * np.pi, rel=1e-9)
+    assert any(note.startswith("CHECK THE SPEED") for note in report.notes)
+    assert report.harmonics["orders"].values[0, 0] < 0.05

@@ -34,6 +34,14 @@ OTHER_COMB = 0.03
 given one is looked for."""
 LEAST_OFF = 0.05
 """The same from which an angle is calibrated: sinc of it is 0.4 % of the line."""
+MEASURED = 5e-3
+"""Share by which a measured speed may be off to be calibrated: displays and converters are within it, and lines of
+other machines seldom."""
+NEVER_FADES = 0.3
+"""Quality (`phase_from_line`) of a line by which a speed is calibrated: two that beat fade, and neither is followed."""
+TOLD_APART, BOTH = 4.0, 0.25
+"""Lines of the spectrum from which two lines are told apart, where a Hann window lets through 0.3 %, and the part of
+the one from which the other stands, too."""
 FOLLOWED = 0.1
 """Turns of the shaft by which the mesh line may wander to be followed; `phase_from_line` follows it by 0.15."""
 LINES_OFF = 2.0
@@ -99,7 +107,7 @@ def compare_with_mesh(
     if _turns(signal, shaft.speed) >= FOLLOWED_TURNS and line_near(signal, gmf, SPEED_TOLERANCE) is None:
         notes.append(_nothing_near(counts[0], shaft.speed, False) + f" It is used as it is, {shaft.origin}.")
         return None
-    if found is None or found.phase is None or _turns_beside(found, counts[0], shaft.speed):
+    if found is None or found.phase is None:
         return None
     if not shaft.integrated:
         told = f"{shaft.speed * 30 / math.pi:.2f} rpm {shaft.origin}"
@@ -126,6 +134,17 @@ def _calibrated(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, not
     lines = abs(off) * shaft.speed * teeth / math.tau / found.resolution
     if lines < LEAST_OFF:
         return shaft
+    gmf, own = shaft.speed * teeth / math.tau, f"{shaft.speed * 30 / math.pi:.2f} rpm {shaft.origin}"
+    fades = float(found.phase.attrs["quality"]) < NEVER_FADES
+    if fades or abs(off) > MEASURED or _turns_beside(found, teeth, shaft.speed):
+        notes += _remark_off(found, shaft.speed, gmf, own, shaft.range is not None)
+        return shaft
+    if lines > TOLD_APART and _stands_beside(_over_angle(signal, shaft, teeth) if steady else over, gmf, off):
+        notes.append(
+            f"CHECK THE SPEED: lines stand at the mesh of {own} and {100.0 * off:+.2f} % off it, one of which is "
+            "something else's. The speed is used as it is."
+        )
+        return shaft
     check = "CHECK THE SPEED: " if lines > LINES_OFF else ""
     notes.append(
         f"{check}By the mesh line the speed {shaft.origin} is {-100.0 * off:+.3f} % off, on average: it is calibrated "
@@ -134,6 +153,14 @@ def _calibrated(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, not
     low_high = None if shaft.range is None else (shaft.range[0] * (1.0 + off), shaft.range[1] * (1.0 + off))
     same = (phase * (1.0 + off)).assign_attrs(phase.attrs)
     return shaft._replace(phase=same, speed=shaft.speed * (1.0 + off), range=low_high)
+
+
+def _stands_beside(over: xr.DataArray, gmf: float, off: float) -> bool:
+    """Return whether a line stands at a mesh frequency (Hz) beside that which is a share off it, in any channel."""
+    turning = np.exp(-2j * math.pi * gmf / rate_of(over) * np.arange(over.sizes["time"]))
+    window = np.hanning(turning.size)
+    moved = turning ** (1.0 + off)
+    return any(abs((window * x) @ turning) > BOTH * abs((window * x) @ moved) for x in over.values.T)
 
 
 def _over_angle(signal: xr.DataArray, shaft: Shaft, teeth: int) -> xr.DataArray:
