@@ -326,7 +326,7 @@ def plain_record(
     --------
     >>> from gearmbs.studies import Case
     >>> record = plain_record(Case(operation={"duration": "auto"}, solver={"lump": True}), variables=["gmf_rms"])
-    >>> record.values("gmf_rms").shape, list(record.values("way"))
+    >>> record.values("gmf_rms").shape, record.values("way").tolist()
     ((2, 3, 4), ['band', 'orders'])
     """
     _check(case, variables)
