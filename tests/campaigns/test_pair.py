@@ -241,7 +241,10 @@ OWN = "from stiffness import K\n\n\ndef sfosub(call):\n    return -K * (call.sys
 
 @pytest.mark.slow
 def test_routines_that_are_edited_under_a_run_are_refused(tmp_path, monkeypatch):
-    """What they import counts as they do: a unit during which it was edited is none, one before and one after are."""
+    """What they import counts as they do: a unit during which it was edited is none, one before and one after are.
+
+    Python takes compiled files for those of a source of the same second and length: what is edited here is longer.
+    """
     (tmp_path / "own.py").write_text(OWN)
     beside = tmp_path / "stiffness.py"
     beside.write_text("K = 100.0\n")
@@ -257,7 +260,7 @@ def test_routines_that_are_edited_under_a_run_are_refused(tmp_path, monkeypatch)
     def edited(self, *given):
         found = run(self, *given)
         if next(count) == 2:
-            beside.write_text("K = 250.5\n")
+            beside.write_text("K = 250.50\n")
         return found
 
     with monkeypatch.context() as patched:
@@ -269,7 +272,7 @@ def test_routines_that_are_edited_under_a_run_are_refused(tmp_path, monkeypatch)
     assert campaign.run(workers=0).codes == 1
     last = 0.5 + 0.5 * np.cos(np.sqrt(100.0 / campaign.table["mass"]) * 0.5)
     np.testing.assert_allclose(campaign.table["request_1.F2.last"], last, atol=1e-5)
-    beside.write_text("K = 250.5\n")
+    beside.write_text("K = 250.50\n")
     assert campaign.run(workers=0, other_code="again").codes == 1
     last = 0.5 + 0.5 * np.cos(np.sqrt(250.5 / campaign.table["mass"]) * 0.5)
     np.testing.assert_allclose(campaign.table["request_1.F2.last"], last, atol=1e-5)
