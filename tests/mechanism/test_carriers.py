@@ -164,7 +164,19 @@ def off_centre(m, one, two):
     m.revolute("pin", two, m.ground, axis=Z)
 
 
-@pytest.mark.parametrize("stand", [in_a_housing, on_shafts, on_springs_alone, on_a_slide, off_centre])
+def hung(m, one, two):
+    """In a box on six springs, three at each of two corners."""
+    box = solid(m, "box")
+    for k, wheel in enumerate((one, two)):
+        m.revolute(f"seat {k}", wheel, box, axis=Z)
+    for k, x in enumerate((-0.1, 0.2)):
+        for c in range(3):
+            far = np.array([x, 0.0, 0.0]) + 0.3 * np.eye(3)[c]
+            m.spring_damper(f"spring {k} {c}", box.marker((x, 0, 0), name=f"corner {k} {c}"),
+                            m.ground.marker(far, name=f"wall {k} {c}"), stiffness=1e6)  # fmt: skip
+
+
+@pytest.mark.parametrize("stand", [in_a_housing, hung, on_shafts, on_springs_alone, on_a_slide, off_centre])
 def test_wheels_whose_axes_stay_count_from_the_ground(stand):
     m = pair(stand)
     assert carrier_of(m, m.elements["mesh"]) is m.ground
@@ -196,3 +208,12 @@ def test_wheels_on_what_swings_are_refused(stand, carrier):
         m.linearize([], ["error"])
     m.carriers["mesh"] = carrier
     assert carrier_of(m, m.elements["mesh"]) is m.bodies[carrier]
+
+
+def test_a_force_that_pushes_holds_nothing():
+    """An arm on a bushing that is free about its axis is found with a force at its tip, too."""
+    m = wheels("springs")
+    tip = m.bodies["arm"].marker((0.05, 0.0, 0.0), name="tip")
+    m.load("push", tip, m.ground.marker((0.05, 0.0, 0.0), name="there"), fx="5*TIME")
+    with pytest.raises(ModelError, match=says("'mesh'", "'planet'", "'arm'")):
+        carrier_of(m, m.elements["mesh"])

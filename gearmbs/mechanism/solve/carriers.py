@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, Protocol
@@ -23,6 +24,8 @@ TURNING = ("revolute", "spherical", "self_aligning", "cylindrical", "universal",
 """Kinds of joints that hold a point across an axis and let bodies turn about it."""
 UNTURNING = ("translational", "orientation")
 """Kinds of joints that let bodies move, and not turn."""
+PLACES = re.compile(r"\bD[XYZM]\s*\(", re.IGNORECASE)
+"""Functions of the place of a marker: a load without them pushes, and holds nothing where it is."""
 OTHERS = ("contact", "friction")
 """Kinds of force elements that hold nothing where it is."""
 RESISTS = 1e-6
@@ -116,10 +119,13 @@ class Supports:
 def _holds(element: Any) -> bool:
     """Return whether a force element holds a point of a body where it is, as a bearing does."""
     if isinstance(element, Load):
-        return element.mode == COMPONENTS and element.has_force
+        texts = " ".join(text for text in element.expressions[:3] if text)
+        return element.mode == COMPONENTS and PLACES.search(texts) is not None
     if isinstance(element, MatrixForce):
         return bool(np.any(element.stiffness[:3, :3]))
-    if not isinstance(element, ForceElement) or isinstance(element, LineSpring) or element.kind in OTHERS:
+    if isinstance(element, LineSpring):
+        return element.stiffness != 0.0
+    if not isinstance(element, ForceElement) or element.kind in OTHERS:
         return False
     return element.has_force and len(element.markers) == 2 and pair_of(element) is None
 
@@ -141,7 +147,7 @@ def _off_line(points: np.ndarray, along: np.ndarray) -> float:
     return float(np.linalg.norm(arms - np.outer(arms @ along, along), axis=1).max())
 
 
-def what_carries(supports: Supports, wheel: Marker, near: float) -> Body | None:
+def what_carries(supports: Supports, wheel: Marker, mate: Marker, near: float) -> Body | None:
     """Return the body that turns about a line which passes a wheel's centre by more than ``near``; None for none.
 
     From the wheel's body down to the ground: a group whose supports all lie on one line turns about it. Through the
@@ -149,12 +155,14 @@ def what_carries(supports: Supports, wheel: Marker, near: float) -> Body | None:
     """
     centre, along = wheel.global_position(), wheel.global_orientation()[:, 2]
     start = supports.of(wheel)
+    # not by way of the other wheel, which carries nothing of this one's axis
+    aside = {supports.of(mate)} - {supports.ground, start}
     rest, passed, found = [(start, wheel.body)], [start], None
     while rest:
         group, body = rest.pop(0)
         if group == supports.ground:
             return None
-        below = supports.below(group, passed, along)
+        below = [one for one in supports.below(group, passed, along) if one.other not in aside]
         free = not below
         if free or all(one.turns for one in below):
             line = next((one.axis for one in below if one.axis is not None), along)
@@ -195,7 +203,8 @@ def _carried(mechanism: Meshing, element: Any) -> tuple[Marker, Body] | None:
     """Return a wheel of a mesh whose axis is carried around, and what carries it; None if both stay."""
     supports = Supports(mechanism)
     near = CARRIED * float(np.linalg.norm(element.j.global_position() - element.i.global_position()))
-    found = ((wheel, what_carries(supports, wheel, near)) for wheel in (element.i, element.j))
+    pairs = ((element.i, element.j), (element.j, element.i))
+    found = ((wheel, what_carries(supports, wheel, mate, near)) for wheel, mate in pairs)
     return next(((wheel, body) for wheel, body in found if body is not None), None)
 
 
