@@ -65,6 +65,10 @@ def test_equal_names_of_states_and_wrong_speeds():
     plant = m.linearize([("transmission_error", "mesh", "acceleration")], [("joint_rate", "one pin")])
     assert len(set(plant.states)) == len(plant.states)
     assert plant.states[-2:] == [f"transmission_error mesh acceleration ({one})" for one in ("position", "rate")]
+    m.carriers["mesh"] = "two"
+    with pytest.raises(ModelError, match=says("'mesh'", "'two'", "simulate")):
+        m.linearize([("transmission_error", "mesh", "position", 50.0)], [])
+    del m.carriers["mesh"]
     for speed, words in ((0.0, says("'mesh'", "0 rad/s")), ("3 m", says("'mesh'", "rad/s"))):
         with pytest.raises(ModelError, match=words):
             m.linearize([("transmission_error", "mesh", "position", speed)], [])
