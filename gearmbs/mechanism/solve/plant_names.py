@@ -222,11 +222,6 @@ class PlantNames:
         if speed is not None:
             label = f"transmission_error '{element.name}': the speed of its first wheel"
             turns = quantity(speed, "rad/s", label)
-            if element.name in self.mechanism.carriers:
-                raise ModelError(
-                    f"{label}: its wheels are carried by '{self.mechanism.carriers[element.name]}', on which such an "
-                    "error acts as well, which is not known here; leave the speed out, or simulate"
-                )
             if not (np.isfinite(turns) and turns):
                 raise ModelError(f"{label} is {turns:g} rad/s; give the one that it turns at, or leave it out")
         one = Given(

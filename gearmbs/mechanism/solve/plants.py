@@ -271,18 +271,37 @@ class _Columns:
             self._lean(given, rows, rate)
 
     def _lean(self, given: Given, rows: np.ndarray, rate: np.ndarray) -> None:
-        """Write the torque F u'/Omega of a mesh that carries F on the first wheel, with whose angle its error goes.
+        """Write what a mesh that carries F does by an error u(phi) that goes with the angle of its first wheel.
 
-        Of the energy k (r_1 phi_1 + r_2 phi_2 - e(phi_1))^2 / 2 the torque on this wheel is -k d (r_1 - de/dphi_1).
+        phi is the angle by which the first wheel has rolled, from where the line of action touches its base circle:
+        phi_1 - theta - beta, theta the direction of the line of centres and cos beta = (r_b1 +- r_b2) / a. Of the
+        energy k (r_b1 phi_1 + r_b2 phi_2 - u)^2 / 2 the error leaves the torque Q = F du/dphi = F u'/Omega on the first
+        wheel, and by d theta = t (dR_2 - dR_1) / a and d beta = cot beta da / a the force Q e / (a sin beta) on its
+        centre and the opposite on the other one, e = cos beta c + sin beta t towards the point of the base circle.
         """
-        first = frame_of(self.instant, given.element.i)
+        first, second = frame_of(self.instant, given.element.i), frame_of(self.instant, given.element.j)
         if first.body < 0 or self.angle[first.body] < 0:
             raise ModelError(
                 f"input {given.name!r}: the first wheel of '{given.element.name}' is fixed; leave its speed out"
             )
-        axis, torque = first.axes[:, 2], self.instant.y[rows[-3:]]
-        share = -float(torque @ axis) / (levers(given.element)[0] * given.speed)
+        force, torque = self.instant.y[rows[:3]], self.instant.y[rows[-3:]]
+        radius, other, _ = levers(given.element)
+        axis = first.axes[:, 2]
+        share = -float(torque @ axis) / (radius * given.speed)
         self._push(rate, first, first.place, axis, True, share)
+        if share == 0.0:
+            return
+        apart = second.place - first.place
+        centres = apart - (apart @ axis) * axis
+        a = float(np.linalg.norm(centres))
+        across = np.cross(axis, centres) / a
+        cosine = (radius + other) / a
+        # e x F is along the torque
+        towards = np.cross(force, axis) * (torque @ axis)
+        sine = float(np.copysign(np.sqrt(1.0 - cosine**2), towards @ across))
+        e = (cosine / a * centres + sine * across) / (a * sine)
+        self._push(rate, first, first.place, e, False, share)
+        self._push(rate, second, second.place, e, False, -share)
 
     def unknowns_of(self, name: str) -> np.ndarray:
         """Return the places in y of the force and torque of an element, and of its states."""
