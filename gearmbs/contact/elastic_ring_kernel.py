@@ -52,7 +52,9 @@ POSE = 44
 """The piece's frame, 18 numbers."""
 PIECE = 62
 CONTACT = 8
-"""Diagnostics of a pair: energy, damping power, friction power, ..., normal force."""
+"""Diagnostics of a pair: energy, damping power, friction power, `DEPTHS` others, normal force."""
+DEPTHS = 4
+"""Penetrations of drive and coast flanks, and how many pairs touch on either."""
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -412,7 +414,8 @@ def ring_meshes(ints, reals, t, frames, states, inputs, want, work, wrench, rate
     work : ndarray
         Scratch.
     diagnostics : ndarray
-        Energy of contacts and rim, damping power of both, friction power, then the normal force of each mesh.
+        Energy of contacts and rim, damping power of both, friction power, the normal force of each mesh, then its
+        `DEPTHS` others of each.
     """
     n, m = ints[MESHES], ints[MODES]
     table = matrix_at(reals, 0, ROWS, m)
@@ -455,6 +458,8 @@ def ring_meshes(ints, reals, t, frames, states, inputs, want, work, wrench, rate
             diagnostics[c] += told[c]
             scratch[c] = 0.0
         diagnostics[3 + k] = told[7]
+        for c in range(DEPTHS):
+            diagnostics[3 + n + DEPTHS * k + c] = told[3 + c]
         if n > 1:
             react(arm, vector_at(scratch, 0, 3), acting, acting, vector_at(wrench, 6 * n, 6))
         if want & DERIVATIVES:

@@ -19,6 +19,7 @@ import scipy.linalg
 from gearmbs.drivetrain.housing import Housing
 from gearmbs.drivetrain.members.carrier import FlexibleCarrier, add_carrier
 from gearmbs.drivetrain.members.pins import pin_bearing
+from gearmbs.drivetrain.members.rim import check_rim, placed, rim_of
 from gearmbs.drivetrain.part import Part, errors_named, require
 from gearmbs.drivetrain.parts import contact_law, flank_friction
 from gearmbs.drivetrain.shaft import Shaft
@@ -67,11 +68,14 @@ class PlanetaryStage(Part):
     carrier_body : FlexibleCarrier or mapping, optional
         How it deforms: a model of finite elements or modes, or how stiff its pins are, as a table of the fields
         of `gearmbs.drivetrain.FlexibleCarrier`. Default: it is rigid.
+    rim : gearmbs.gears.ElasticRim or mapping, optional
+        How the rim of a ring bends that is held by the ground or a housing, or a table of its fields, its bolts at
+        angles about the axis from where the shaft's x axis is at angle zero. Default: it is rigid.
 
     Raises
     ------
     DrivetrainError
-        For pins and masses that are none.
+        For pins, masses and rims that are none.
     """
 
     title: ClassVar[str] = "planetary stage"
@@ -86,6 +90,7 @@ class PlanetaryStage(Part):
     pins: Any = None
     masses: Mapping[str, Any] = field(default_factory=dict)  # type: ignore[assignment]
     carrier_body: Any = None
+    rim: Any = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -97,6 +102,8 @@ class PlanetaryStage(Part):
                 "masses has carrier beside a model of it, from which they follow; leave one of them out",
             )
             _ = self.weights
+            if self.rim is not None:
+                object.__setattr__(self, "rim", rim_of(self.rim, self.gears))
         with errors_named(f"{self.label}: pins"):
             _ = self.on_pins
 
@@ -235,7 +242,7 @@ SET_KEYS = (
     *(f.name for f in fields(PlanetarySet) if f.name not in ("sun", "planet", "ring", "planets")),
 )
 """Keys of a set in a file."""
-STAGE_KEYS = (*MEMBERS, *(f"{member}_station" for member in MEMBERS), "pins", "masses", "carrier_body")
+STAGE_KEYS = (*MEMBERS, *(f"{member}_station" for member in MEMBERS), "pins", "masses", "carrier_body", "rim")
 """Keys of a stage in a file beside those of its set."""
 
 
@@ -373,6 +380,8 @@ def check_stage(train: Drivetrain, stage: PlanetaryStage) -> None:
         f"{stage.label}: members are on one shaft ({', '.join(f'{m} on {on!r}' for m, on in turning.items())}); give "
         "each a shaft of its own",
     )
+    if stage.rim is not None:
+        check_rim(stage.label, stage.ring, turns="ring" in turning)
 
 
 # Speeds and torques of stages none of whose members is held.
@@ -557,8 +566,9 @@ def add_stage(m: Mechanism, train: Drivetrain, layout: Layout, stage: PlanetaryS
         "steps": np.array([layout.wheels[planet] for planet in planets]),
     }
     ring = wheel("ring", layout.wheels[f"{stage.name} ring"])
+    rim = placed(stage.rim, layout.wheels[f"{stage.name} ring"] + layout.angles.get(stage.ring, 0.0))
     carrier, sense = add_carrier(m, train, stage, origin, axes, carrier_angle), stage.sense(train)
     members = Members(wheel("sun", 0.0), carrier, ring, origin, axes, carrier_angle, f"{stage.name} ", sense)
     with errors_named(stage.label):
         gears = stage.with_rotation(train)
-        add_planets(m, gears, members, start, stage.weights["planet"], turns, stage.on_pins)
+        add_planets(m, gears, members, start, stage.weights["planet"], turns, stage.on_pins, rim)

@@ -478,6 +478,10 @@ class RimModes:
         return np.sqrt(np.linalg.eigvalsh(scale[:, None] * self.stiffness * scale)) / (2 * np.pi)
 
 
+DEPTHS = {"penetration_drive": "m", "penetration_back": "m", "pairs_drive": "1", "pairs_back": "1"}
+"""What is told of each mesh beside its normal force, with units."""
+
+
 @dataclass(eq=False, repr=False)
 class RingMeshes(ForceElement):
     """Meshes of all planets with a ring whose rim bends: see `gearmbs.contact.elastic_ring_kernel`.
@@ -504,13 +508,16 @@ class RingMeshes(ForceElement):
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:  # type: ignore[override]
-        """Energy of contacts and rim, powers lost, and the normal force of each mesh."""
-        forces = (Diagnostic(f"normal_force_{k + 1}", "N") for k in range(len(self.planets)))
+        """Energy of contacts and rim, powers lost, the normal force of each mesh, and how deep its teeth are."""
+        meshes = range(1, len(self.planets) + 1)
+        forces = (Diagnostic(f"normal_force_{k}", "N") for k in meshes)
+        depths = (Diagnostic(f"{name}_{k}", unit) for k in meshes for name, unit in DEPTHS.items())
         return (
             Diagnostic("elastic_energy", "J", STORED),
             Diagnostic("damping_power", "W", DISSIPATED),
             Diagnostic("friction_power", "W", DISSIPATED),
             *forces,
+            *depths,
         )
 
     @property
@@ -549,6 +556,11 @@ class RingMeshes(ForceElement):
                 for what, one in found[0].items()
             },
         )
+
+    @property
+    def state_masses(self) -> np.ndarray:
+        """Masses of the modes by the square of a state's unit, kg m^2: kinetic energy is half of them by rates."""
+        return UNIT**2 * self.modes.mass
 
     def rim_motion(self, solution: Any, angle: float) -> dict[str, np.ndarray]:
         """Return how the rim moves at an angle of the ring, as a sensor that is fixed there sees it.

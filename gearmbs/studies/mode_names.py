@@ -12,6 +12,7 @@ import xarray as xr
 
 from gearmbs.drivetrain import Drivetrain, DrivetrainError, Housing, Mount, Shaft
 from gearmbs.drivetrain.couplings.misaligned import seat_of
+from gearmbs.drivetrain.members.rim import rim_meshes, ring_meshes_of, with_rims
 from gearmbs.drivetrain.plants import loaded
 from gearmbs.drivetrain.torsional import warn_of_overdamped_meshes
 from gearmbs.mechanism import linear_modes
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible import ModalModel
     from gearmbs.units import QuantityLike
 
-KINDS = ("mesh", "shaft", "carrier", "bearing", "coupling", "housing", "mount", "load", "other")
+KINDS = ("mesh", "ring", "shaft", "carrier", "bearing", "coupling", "housing", "mount", "load", "other")
 """What parts are, in the order of tables; drives count as loads."""
 
 MOTIONS = ("bending", "torsion", "stretching")
@@ -128,6 +129,7 @@ def part_kinds(train: Drivetrain) -> dict[str, str]:
     out |= {mesh.name: "mesh" for mesh in train.meshings} | dict.fromkeys(train.pins, "bearing")
     out |= {seat_of(coupling): "coupling" for coupling in train.couplings}
     out |= {stage.carrier_name: "carrier" for stage in train.planetary_stages}
+    out |= {ring_meshes_of(stage.name): "ring" for stage in train.planetary_stages if stage.rim is not None}
     return out | {mount.name: "mount" for housing in train.housings for mount in housing.mounts}
 
 
@@ -151,8 +153,8 @@ def named_modes(train: Drivetrain, modes: Modes | None = None) -> xr.Dataset:
     if modes is None:
         modes = train_modes(train)
     chosen = modes.oscillating
-    parts = modes.parts
-    assert parts is not None
+    assert modes.parts is not None
+    parts = with_rims(train, modes.parts, np.abs(modes.eigenvalues))
     known = part_kinds(train)
     kinds = [known.get(name, "other") for name in parts.names]
     names = [_name(train, parts, kinds, row) for row in chosen]
@@ -235,7 +237,7 @@ def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Datas
     """Return a Campbell diagram with the names of its modes and the gain of each crossing."""
     named = named_modes(train, modes)
     orders = dict(zip(diagram["order"].values.tolist(), diagram["order_name"].values.tolist()))
-    gains = []
+    gains, on_rims = [], rim_meshes(train)
     for k, order in zip(diagram["critical_mode"].values, diagram["critical_order"].values):
         one = named.sel(mode=int(k))
         part = orders[float(order)].split(" x ", 1)[1]
@@ -243,7 +245,10 @@ def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Datas
             share = one["kinetic"].sel(body=part)
         else:
             # all planets of a stage, as if they meshed in the phase that moves the mode most
-            share = one["energy"].sel(part=[m.name for m in train.meshings if part in (m.name, m.group, m.stage)]).sum()
+            meshes = [m.name for m in train.meshings if part in (m.name, m.group, m.stage)]
+            # a ring whose rim bends is one part with its meshes
+            told = {ring_meshes_of(on_rims[name][0]) if name in on_rims else name for name in meshes}
+            share = one["energy"].sel(part=sorted(told)).sum()
         ratio = float(one["damping_ratio"])
         # the force that a mesh carries turns with its wheels, and may make a share that is all but none negative
         gains.append(gain_of(float(share), ratio))

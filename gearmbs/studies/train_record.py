@@ -16,6 +16,7 @@ import xarray as xr
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain import Accelerometer, Drivetrain, Housing, Laser, Shaft, SpeedSensor, TorqueSensor
 from gearmbs.drivetrain.kinematics import RPM, KinematicTable, table_at
+from gearmbs.drivetrain.members.rim import rim_meshes, told_of_mesh
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, differentials
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals.files.simulated import held_speed
@@ -153,8 +154,9 @@ class TrainRecorder:
         """Return what is recorded of one part of a solution."""
         train, m = self.train, part.t.size
         contact = np.empty((m, len(train.meshings), len(CONTACT)))
+        on_rims = rim_meshes(train)
         for k, mesh in enumerate(train.meshings):
-            told = part.contact(mesh.name)
+            told = told_of_mesh(part, *on_rims[mesh.name]) if mesh.name in on_rims else part.contact(mesh.name)
             if "deflection" in told:
                 told = _of_an_ideal_mesh(told)
             contact[:, k] = np.stack([told[name] for name in CONTACT], axis=1)

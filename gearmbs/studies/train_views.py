@@ -11,6 +11,7 @@ import xarray as xr
 
 from gearmbs.drivetrain import Accelerometer, Drivetrain, DrivetrainError, UniversalJoint
 from gearmbs.drivetrain.kinematics import RPM
+from gearmbs.drivetrain.members.rim import ring_meshes_of
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage
 from gearmbs.gears.geometry import turn_z
 from gearmbs.signals import spectrum
@@ -257,7 +258,8 @@ def train_scene(train: Drivetrain) -> Scene:
     ]
     for stage in train.planetary_stages:
         # the solids of a ring that is held are on no body of their own
-        marker = mechanism.elements[f"{stage.planet(1)}-ring"].j
+        rim = mechanism.elements.get(ring_meshes_of(stage.name))
+        marker = (rim or mechanism.elements[f"{stage.planet(1)}-ring"]).j
         if "ring" not in stage.turning(train):
             _, ring = pair_solids(train.pairs[f"{stage.planet(1)}-ring"], TOLERANCE)
             place, axes = marker.global_position()[None], marker.global_orientation()[None]

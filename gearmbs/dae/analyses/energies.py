@@ -8,7 +8,8 @@ C_e = -A_e G_e; a body with modes has its own block of K and C. Of a mode with |
     part of its damping     Re(x^H C_e x) / (2 omega x^H M x),
 
 which sum to one and to the damping ratio where C is small; what is in neither, as loads that turn with their bodies, is
-the rest. Motion has Re(x_b^H (M x)_b) / x^H M x of body b.
+the rest. States of elements go with them, z = (s - S)^-1 (P + s Q) x, and loads with those. Motion has
+Re(x_b^H (M x)_b) / x^H M x of body b.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ class ModeParts:
         Share of the kinetic energy, of all bodies in the order of the modes' ``body_names``.
     strain : dict of str to ndarray, shape (k, modes of the body)
         Share of the energy in each modal coordinate of a body, in the order of its modes.
+    states : dict of str to ndarray of complex, shape (k,)
+        Changes of the states of elements, with an inertia x^H M x of 1 kg m^2 of the bodies.
     """
 
     names: list[str]
@@ -41,6 +44,7 @@ class ModeParts:
     damping: np.ndarray
     kinetic: np.ndarray
     strain: dict[str, np.ndarray]
+    states: dict[str, np.ndarray]
 
     @property
     def rest(self) -> np.ndarray:
@@ -48,7 +52,7 @@ class ModeParts:
         return 1.0 - self.energy.sum(axis=1)
 
 
-def mode_parts(instant: Instant, motions: np.ndarray, frequencies: np.ndarray) -> ModeParts:
+def mode_parts(instant: Instant, motions: np.ndarray, eigenvalues: np.ndarray) -> ModeParts:
     """Return where the energy of modes is.
 
     Parameters
@@ -57,9 +61,10 @@ def mode_parts(instant: Instant, motions: np.ndarray, frequencies: np.ndarray) -
         That they were linearised about.
     motions : ndarray of complex, shape (n, k)
         Changes of (R, theta, q_f).
-    frequencies : ndarray, shape (k,)
-        |s|, rad/s; zero and NaN of what has none.
+    eigenvalues : ndarray of complex, shape (k,)
+        s, rad/s; zero of what has none.
     """
+    frequencies = np.abs(eigenvalues)
     matrix = instant.matrix(instant.y)
     mass = instant.mass_matrix(matrix)
     full = matrix.toarray()
@@ -77,6 +82,15 @@ def mode_parts(instant: Instant, motions: np.ndarray, frequencies: np.ndarray) -
     if loads.size:
         followed = np.linalg.solve(full[np.ix_(loads, loads)], full[np.ix_(loads, np.r_[place, speed])])
     moved, sped = followed[:, : place.size] @ motions, followed[:, place.size :] @ motions
+    sources = instant.block("z", "mu")
+    by_states = np.zeros((loads.size, sources.size))
+    if loads.size and sources.size:
+        by_states = np.linalg.solve(full[np.ix_(loads, loads)], full[np.ix_(loads, sources)])
+    # what the states' rates have of coordinates, speeds and states, the loads put in
+    own = full[np.ix_(sources, np.r_[place, speed, sources])]
+    own = own - full[np.ix_(sources, loads)] @ np.hstack([followed, by_states])
+    states = _states(instant, own, motions, eigenvalues)
+    moved = moved + by_states @ states
     # work of the loads' action on each motion, by load
     work = (full[np.ix_(force, loads)].T @ motions.conj()) if loads.size else np.zeros((0, motions.shape[1]))
     bodies, counts = instant.system.body_names, instant.system.model.modes[1:]
@@ -106,10 +120,34 @@ def mode_parts(instant: Instant, motions: np.ndarray, frequencies: np.ndarray) -
     with np.errstate(divide="ignore", invalid="ignore"):
         total = frequencies**2 * inertia
         scale = np.where(total > 0.0, 1.0 / total, np.nan)[:, None]
+        labels = (instant.problem.names[row] for row in instant.block("z", "mu"))
+        told = {label[label.index("(") + 1 : -1]: row for label, row in zip(labels, states / np.sqrt(inertia))}
         return ModeParts(
             names + deforming, energy * scale, 0.5 * damping * scale * frequencies[:, None], kinetic / inertia[:, None],
-            {name: one * scale for name, one in strain.items()},
+            {name: one * scale for name, one in strain.items()}, told,
         )  # fmt: skip
+
+
+def _states(instant: Instant, own: np.ndarray, motions: np.ndarray, eigenvalues: np.ndarray) -> np.ndarray:
+    """Return the changes of elements' states in modes, shape (states, k); zero of motions without a frequency.
+
+    Parameters
+    ----------
+    own : ndarray, shape (states, 2 n + states)
+        Derivatives of their equations by coordinates, speeds and states.
+    motions, eigenvalues
+        As of `mode_parts`.
+    """
+    rows, n = instant.block("z", "mu"), motions.shape[0]
+    out = np.zeros((rows.size, motions.shape[1]), dtype=complex)
+    if not rows.size:
+        return out
+    still, rated = (instant.matrix(instant.y, cj)[rows][:, rows].toarray() for cj in (0.0, 1.0))
+    for k, s in enumerate(eigenvalues):
+        if s != 0.0:
+            driven = (own[:, :n] + s * own[:, n : 2 * n]) @ motions[:, k]
+            out[:, k] = -np.linalg.solve(own[:, 2 * n :] + s * (rated - still), driven)
+    return out
 
 
 def _by_body(instant: Instant, shared: np.ndarray) -> np.ndarray:

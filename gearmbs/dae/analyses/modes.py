@@ -184,7 +184,7 @@ def linear_modes(place: System | Instant, joints: Sequence[JointCoordinate] = ()
         kinds,
         _unit(instant.spatial(reduced.basis @ motions)),
         instant.system.body_names,
-        mode_parts(instant, reduced.basis @ motions, size),
+        mode_parts(instant, reduced.basis @ motions, eigenvalues),
     )
 
 

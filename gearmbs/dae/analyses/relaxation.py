@@ -53,10 +53,20 @@ class Relaxation:
         for (name, value), end in zip(kinds.items(), ends):
             sizes = np.concatenate([sizes, np.full(instant.block(name, end).size, value)])
         self.sizes = sizes
+        self._size_states()
         heaviest = weight if weight > 0.0 else 1.0
         light = self._by_kind(heaviest, heaviest * arm**2)
         self.floor = 1e-3 * np.concatenate([light, typical[:, 1]])
         self.reach = np.concatenate([self._by_kind(self.length, 1.0), typical[:, 0]])
+
+    def _size_states(self) -> None:
+        """Let states balance to what they are known to: rates of stiff ones, as of a rim, are large numbers' rest."""
+        count = self.instant.differential.size
+        if not count:
+            return
+        matrix = abs(self.instant.matrix(self.instant.y)[self.rows][:, self.columns]).tocsr()
+        stiff = matrix[-count:, -count:].max(axis=1).toarray().ravel()
+        self.sizes[-count:] = np.maximum(self.sizes[-count:], np.where(self.instant.differential, stiff, 0.0))
 
     def _by_kind(self, displacement: float, rotation: float) -> np.ndarray:
         """Return one number for each displacement and another for each rotation of the bodies."""

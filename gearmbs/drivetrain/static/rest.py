@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.dae.problem import ModelError
+from gearmbs.drivetrain.members.rim import rim_meshes, told_of_mesh
 from gearmbs.drivetrain.placement import order
 from gearmbs.drivetrain.plants import ITERATIONS, resting
 from gearmbs.mechanism.parts.modal import ModalBody
@@ -78,7 +79,12 @@ def position_of_rest(train: Drivetrain) -> Rest:
         is_joint = bearing.name in mechanism.joints
         force = (rest.reaction(bearing.name) if is_joint else rest.load(bearing.name))[0][-1]
         out.bearings[bearing.name] = force @ still.layout.seats[bearing.shaft].axes
+    on_rims = rim_meshes(still)
     for mesh in still.meshings:
+        if mesh.name in on_rims:
+            # along the rim, which bends, axes stand to each other as the flanks do
+            out.forces[mesh.name] = float(told_of_mesh(rest, *on_rims[mesh.name])["normal_force"][-1])
+            continue
         _add_mesh(out, still, mesh, mechanism.elements[mesh.name], rest)
     return out
 
