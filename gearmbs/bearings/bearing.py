@@ -30,6 +30,8 @@ Boundary = Annotated[Quantity, Measure("length", above=0, below=10)]
 Force = Annotated[Quantity, Measure("force", above=0)]
 GROOVE = Measure(above=0.5, below=1, remedy="a groove is wider than its ball: give 0.505 to 0.6")
 ELEMENT_SIZE = Measure("length", above=0, below=1)
+RIGHT = 1e-9
+"""Distance from a right angle, rad, that is rounding."""
 TOUCHING = 1e-9
 """Rounding of the diameters of bearings without a ring, whose needles run on the shaft or in the housing."""
 
@@ -117,7 +119,7 @@ class Bearing(Described):
     elements: Annotated[int, Measure(low=3, whole=True)]
     element_diameter: Annotated[Quantity, ELEMENT_SIZE]
     pitch_diameter: Annotated[Quantity, Measure("length")]
-    contact_angle: Annotated[Quantity, Measure("angle", low=0, below=90, shown="deg")] = 0.0
+    contact_angle: Annotated[Quantity, Measure("angle", low=0, high=90, shown="deg")] = 0.0
     kind: str = "deep groove"
     inner_curvature: Annotated[Quantity, GROOVE] = 0.515
     outer_curvature: Annotated[Quantity, GROOVE] = 0.525
@@ -178,6 +180,12 @@ class Bearing(Described):
             require(
                 angle > 0.0, f"Bearing.contact_angle is 0; a bearing of kind '{self.kind}' needs one, such as '25 deg'"
             )
+        right = abs(angle - 0.5 * math.pi) <= RIGHT
+        require(
+            right if KINDS[self.kind].axial else not right,
+            f"Bearing.contact_angle is {math.degrees(angle):.4g} deg; of {self.kind} bearings it is "
+            f"{'90 deg' if KINDS[self.kind].axial else 'less than 90 deg'}",
+        )
         if KINDS[self.kind].angle == "none":
             require(angle == 0.0, f"Bearing.contact_angle is {angle:g} rad; of {self.kind}s it is 0")
         if KINDS[self.kind].rows in ("parallel", "back to back"):

@@ -100,6 +100,8 @@ class Kind:
         Balls touch each groove at two points, one for each sense of the axial load.
     one_shoulder : bool
         Grooves have one shoulder, across which an axial load against the bearing's sense would be carried.
+    axial : bool
+        Whether it carries axial loads alone: C and C_0 are then C_a and C_0a, and the contact angle is 90 degrees.
     preloaded : bool
         Whether a preload is set by moving a ring along the axis; else by a negative clearance.
     reduction : float
@@ -132,6 +134,7 @@ class Kind:
     rows: Literal["one", "parallel", "back to back", "self-aligning"] = "one"
     both_ways: bool = False
     one_shoulder: bool = False
+    axial: bool = False
     preloaded: bool = False
     reduction: float
     steel: float = 1.0
@@ -247,6 +250,20 @@ def _tapered_factors(bearing: Bearing, radial: float, axial: float) -> tuple[flo
     return 1.5 * math.tan(bearing.contact_angle), 0.4, 0.4 / math.tan(bearing.contact_angle)
 
 
+LEANING = 0.05
+"""Force across a thrust bearing by the axial one up to which it is what its grooves hold, whose contacts then lean by 3
+degrees: their loads are 0.1 % larger, and the life is that of the axial load."""
+
+
+def _thrust_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
+    require(
+        radial <= LEANING * max(axial, 1.0),
+        f"F_r is {radial:.4g} N beside F_a of {axial:.4g} N, and a {bearing.kind} bearing carries no radial load: let "
+        "another bearing hold the shaft across its axis",
+    )
+    return 0.0, 0.0, 1.0
+
+
 # What a designation fixes of cylindrical and tapered roller, angular contact and four-point bearings.
 #
 # Boundary dimensions are those of the dimension series (ISO 15, ISO 355). Of cylindrical roller bearings the raceways F
@@ -356,6 +373,12 @@ def _self_aligning(found: re.Match[str], boundary: dict[str, Any]) -> Known:
 def _spherical(found: re.Match[str], boundary: dict[str, Any]) -> Known:
     fields = {**boundary, "pitch_diameter": _middle(boundary)}
     return Known(fields, ("elements", "element_diameter", "roller_length", "contact_angle"))
+
+
+def _thrust(found: re.Match[str], boundary: dict[str, Any]) -> Known:
+    fields = {**boundary, "pitch_diameter": _middle(boundary), "contact_angle": 0.5 * math.pi}
+    rollers = ("roller_length",) if found[1].startswith("8") else ()
+    return Known(fields, ("elements", "element_diameter", *rollers))
 
 
 FULL = Usual(size=0.270, fill=0.97, length=0.60)
@@ -505,11 +528,37 @@ KINDS: dict[str, Kind] = {
         known=_spherical,
         classes="spherical",
     ),
+    "thrust ball": Kind(
+        angle="needed",
+        axial=True,
+        one_shoulder=True,
+        preloaded=True,
+        reduction=1.0,
+        load_factors=_thrust_factors,
+        usual=Usual(size=0.370, fill=0.84),
+        designation=re.compile(r"^(51[1-4])(\d\d)(?!\d)"),
+        series={digits: digits for digits in ("511", "512", "513", "514")},
+        known=_thrust,
+        unclassed="it has none",
+    ),
+    "thrust cylindrical roller": Kind(
+        rollers=True,
+        angle="needed",
+        axial=True,
+        preloaded=True,
+        reduction=1.0,
+        load_factors=_thrust_factors,
+        usual=Usual(size=0.300, fill=0.75, length=0.45),
+        designation=re.compile(r"^(81[12])(\d\d)(?!\d)"),
+        series={"811": "811", "812": "812"},
+        known=_thrust,
+        unclassed="it has none",
+    ),
 }
 
 NOT_THERE = (
-    (r"5[1-4][1-4]\d\d(?!\d)", "a thrust ball bearing"),
-    (r"8(?:11|12|9[34])\d\d(?!\d)", "a cylindrical roller thrust bearing"),
+    (r"5[2-4][1-4]\d\d(?!\d)", "a thrust ball bearing of two directions or with a spherical washer"),
+    (r"89[34]\d\d(?!\d)", "a cylindrical roller thrust bearing"),
     (r"29[2-4]\d\d(?!\d)", "a spherical roller thrust bearing"),
 )
 """Designations of thrust bearings, of which there is no kind."""

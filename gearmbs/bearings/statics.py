@@ -151,7 +151,8 @@ class BearingStatics:
         Warns
         -----
         UserWarning
-            If an angular contact bearing carries an axial load against its sense, on the other shoulder of its grooves.
+            If an angular contact or thrust ball bearing carries an axial load against its sense, on the other shoulder
+            of its grooves.
         """
         wanted = _numbers(load, "load", ("force", "torque"))
         place = self._first(wanted) if start is None else self._five(start, "start")

@@ -300,6 +300,8 @@ class RollingContactBearing(Bearing):
     def holds(self, count: int) -> np.ndarray:
         from gearmbs.bearings.kinds import KINDS as ROLLING
 
+        if ROLLING[self.rolling.kind].axial:
+            return np.eye(5)[2:3]
         if ROLLING[self.rolling.kind].rows == "back to back":
             # their lines of contact meet the axis at two places, so that they hold tilts, too
             return np.eye(5)

@@ -557,11 +557,6 @@ class RingMeshes(ForceElement):
             },
         )
 
-    @property
-    def state_masses(self) -> np.ndarray:
-        """Masses of the modes by the square of a state's unit, kg m^2: kinetic energy is half of them by rates."""
-        return UNIT**2 * self.modes.mass
-
     def rim_motion(self, solution: Any, angle: float) -> dict[str, np.ndarray]:
         """Return how the rim moves at an angle of the ring, as a sensor that is fixed there sees it.
 

@@ -20,8 +20,6 @@ from gearmbs.gears.planetary_mechanism import DEPTHS, UNIT, ElasticRim, RimModes
 from gearmbs.schema.described import check_keys
 
 if TYPE_CHECKING:
-    from gearmbs.dae.results.solution import Solution
-    from gearmbs.drivetrain.drivetrain import Drivetrain
     from gearmbs.gears.planetary_set import PlanetarySet
 
 KEYS = tuple(ElasticRim.__dataclass_fields__)
@@ -38,7 +36,9 @@ def rim_of(given: Any, gears: PlanetarySet) -> ElasticRim:
     if not isinstance(given, ElasticRim):
         if not isinstance(given, Mapping):
             raise ValueError(f"rim is {given!r}; give a table, or a gearmbs.gears.ElasticRim")
-        table = {key: tuple(value) if isinstance(value, list) else value for key, value in given.items()}
+        table: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value for key, value in given.items()
+        }
         check_keys(table, KEYS, "", ValueError, form="unknown key rim.{}")
         given = ElasticRim(**table)
     if any(isinstance(mesh, IdealMesh) for mesh in gears.meshes("ring")):
@@ -73,19 +73,19 @@ def ring_meshes_of(stage: str) -> str:
     return f"{stage} ring meshes"
 
 
-def rim_meshes(train: Drivetrain) -> dict[str, tuple[str, int]]:
+def rim_meshes(train: Any) -> dict[str, tuple[str, int]]:
     """Return the stage and the planet's number, from 1, of each mesh with a ring whose rim bends, by its name."""
     stages = [stage for stage in train.planetary_stages if stage.rim is not None]
     return {f"{stage.planet(k)}-ring": (stage.name, k) for stage in stages for k in range(1, stage.gears.planets + 1)}
 
 
-def told_of_mesh(part: Solution, stage: str, number: int) -> dict[str, np.ndarray]:
-    """Return what is told of the mesh of a planet (from 1) with a ring whose rim bends, as of a contact of its own."""
+def told_of_mesh(part: Any, stage: str, number: int) -> dict[str, np.ndarray]:
+    """Return what a solution tells of the mesh of a planet, from 1, with a ring whose rim bends."""
     told = part.diagnostics(ring_meshes_of(stage))
     return {name: told[f"{name}_{number}"] for name in ("normal_force", *DEPTHS)}
 
 
-def with_rims(train: Drivetrain, parts: Any, frequencies: np.ndarray) -> Any:
+def with_rims(train: Any, parts: Any, frequencies: np.ndarray) -> Any:
     """Return where the energy of modes is, a ring whose rim bends being one part with its meshes.
 
     The rim moves, too: with q its amplitudes and m their masses, of which bodies have the inertia 1, a mode's energies
