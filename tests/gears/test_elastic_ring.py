@@ -58,14 +58,14 @@ def test_derivatives_of_the_element(planets):
         frames[k, 12:] = rng.standard_normal(6) * np.repeat([0.1, 2.0], 3)
 
     def call(given, z, want=0):
-        wrench, rates, told = np.zeros((wrenches, 6)), np.zeros(2 * m), np.zeros(3 + n)
+        wrench, rates, told = np.zeros((wrenches, 6)), np.zeros(2 * m), np.zeros(len(element.diagnostics))
         jac = np.zeros((6 * wrenches + 2 * m, 12 * (n + 1) + 2 * m))
         kernel(ints, np.array(made.reals), 0.0, given, z, np.zeros(0), want, np.zeros(made.scratch), wrench, rates, jac,
                told)  # fmt: skip
         return np.concatenate([wrench.ravel(), rates]), jac, told
 
     value, exact, told = call(frames, states, 1)
-    assert np.count_nonzero(told[3:]) >= max(1, n - 1)
+    assert np.count_nonzero(told[3 : 3 + n]) >= max(1, n - 1)
     found = np.zeros_like(exact)
 
     def moved(column, step):

@@ -146,7 +146,12 @@ def _states(instant: Instant, own: np.ndarray, motions: np.ndarray, eigenvalues:
     for k, s in enumerate(eigenvalues):
         if s != 0.0:
             driven = (own[:, :n] + s * own[:, n : 2 * n]) @ motions[:, k]
-            out[:, k] = -np.linalg.solve(own[:, 2 * n :] + s * (rated - still), driven)
+            matrix = own[:, 2 * n :] + s * (rated - still)
+            try:
+                out[:, k] = -np.linalg.solve(matrix, driven)
+            except np.linalg.LinAlgError:
+                # the least change, where a mode is a state's own
+                out[:, k] = -np.linalg.lstsq(matrix, driven, rcond=None)[0]
     return out
 
 
