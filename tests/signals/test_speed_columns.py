@@ -33,7 +33,7 @@ def written(path, label, values):
     ("Drehzahl [1/s]", 1.0 / 60.0), ("n [1/s]", 1.0 / 60.0), ("Drehfrequenz [Hz]", 1.0 / 60.0),
     ("f_rot [Hz]", 1.0 / 60.0), ("Wellenfrequenz [Hz]", 1.0 / 60.0), ("rotational frequency [Hz]", 1.0 / 60.0),
     ("n [0.1 rpm]", 10.0), ("n [0,1 1/min]", 10.0), ("speed [rpm x 10]", 0.1), ("Drehzahl [x 0.5 U/min]", 2.0),
-    ("n [10^-1 rpm]", 10.0), ("n [rpm]", 1.0),
+    ("n [10^-1 rpm]", 10.0), ("n [rpm]", 1.0), ("n [min\u207b\u00b9]", 1.0), ("n / s\u207b\u00b9", 1.0 / 60.0),
 ])  # fmt: skip
 def test_speeds_are_used_in_the_unit_that_name_and_unit_mean(label, factor, tmp_path):
     signal = read_signal(written(tmp_path / "s.csv", label, factor * RPM))
@@ -142,3 +142,41 @@ def test_a_foreign_line_alone_beside_a_told_speed_is_said_and_not_taken():
     assert report.speed == pytest.approx(50.0 * np.pi, rel=1e-9)
     assert any(note.startswith("CHECK THE SPEED") for note in report.notes)
     assert report.harmonics["orders"].values[0, 0] < 0.05
+
+
+def analysed(rpm, column):
+    """A mesh line of 23 teeth and its second harmonic at a speed (rpm), beside a column that says another."""
+    t = np.arange(rpm.size) / 12800.0
+    angle = np.cumsum(rpm) * 2 * np.pi / 60.0 / 12800.0
+    values = 2 * np.cos(23 * angle) + np.cos(46 * angle) + 0.3 * np.random.default_rng(1).standard_normal(t.size)
+    return analyse(pd.DataFrame({"time": t, "acc [m/s^2]": values, "speed [rpm]": column}), 23)
+
+
+TIMES = np.arange(6 * 12800) / 12800.0
+SWAYS, RISES, STAYS = 1500.0 + 100.0 * np.sin(0.6 * np.pi * TIMES), 900.0 + 150.0 * TIMES, np.full(TIMES.size, 1500.0)
+
+
+@pytest.mark.parametrize(
+    ("rpm", "column"),
+    [
+        (SWAYS, np.interp(TIMES - 0.1, TIMES, SWAYS)),
+        (RISES, np.interp(TIMES - 0.02, TIMES, RISES)),
+        (RISES, RISES + 3.0),
+        (STAYS, STAYS * (1.0 + 3e-4 * TIMES)),
+    ],
+    ids=["late, swaying", "late, rising", "an offset", "a drift"],
+)
+def test_a_speed_column_that_no_factor_mends_is_told(rpm, column):
+    """The phase of the mesh line wanders, which one factor cannot mend: most of the line is lost, and that is said."""
+    report = analysed(rpm, column)
+    assert report.harmonics["orders"].values[0, 0] < 1.0
+    assert sum("phase wanders" in note for note in report.notes) == 1
+
+
+@pytest.mark.parametrize("rpm", [SWAYS, RISES, STAYS])
+@pytest.mark.parametrize("share", [0.0, 0.003, -0.004])
+def test_a_speed_column_that_a_factor_mends_has_its_lines(rpm, share):
+    """0.3 % are ten lines of the spectrum; what is beside the line is not told of another."""
+    report = analysed(rpm, rpm * (1.0 + share))
+    np.testing.assert_allclose(report.harmonics["orders"].values[:2, 0], [np.sqrt(2.0), np.sqrt(0.5)], rtol=0.02)
+    assert not any("phase wanders" in note or "something else" in note for note in report.notes)

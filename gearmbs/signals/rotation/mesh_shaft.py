@@ -26,6 +26,7 @@ from gearmbs.signals.rotation.speed import (
     line_near,
     own_lines_missing,
 )
+from gearmbs.signals.rotation.spread import remark_spread
 from gearmbs.signals.rotation.sweep import remark_sweep, remark_wander
 from gearmbs.signals.signal.signal import make_signal, rate_of, units_of
 
@@ -74,6 +75,9 @@ def mesh_shaft(
     elif found is not None:
         notes += found.phase.attrs.get("notes", ())
         shaft = _calibrated(signal, teeth, found, notes) if found.integrated else found
+        if found.integrated and _turns(signal, shaft.speed) >= FOLLOWED_TURNS:
+            over = _over_angle(signal, shaft, teeth[0])
+            notes += remark_spread(over, shaft.speed, teeth[0], shaft.origin)
         if found.range is None and not found.integrated:
             compare_with_mesh(signal, teeth, shaft, notes)
     else:
@@ -157,9 +161,9 @@ def _calibrated(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, not
 
 def _stands_beside(over: xr.DataArray, gmf: float, off: float) -> bool:
     """Return whether a line stands at a mesh frequency (Hz) beside that which is a share off it, in any channel."""
-    turning = np.exp(-2j * math.pi * gmf / rate_of(over) * np.arange(over.sizes["time"]))
-    window = np.hanning(turning.size)
-    moved = turning ** (1.0 + off)
+    angle = math.tau * gmf / rate_of(over) * np.arange(over.sizes["time"])
+    window = np.hanning(angle.size)
+    turning, moved = np.exp(-1j * angle), np.exp(-1j * (1.0 + off) * angle)
     return any(abs((window * x) @ turning) > BOTH * abs((window * x) @ moved) for x in over.values.T)
 
 

@@ -33,13 +33,13 @@ CLOCK_NAMES = frozenset(
     "xvalue sampletime tempo temps timems timeus cas".split()
 )
 RPM_UNITS = frozenset(
-    "rpm 1/min min-1 min^-1 u/min umin r/min rev/min tr/min t/min tpm ot/min ot./min otmin 1/minute giri/min obr/min "
-    "obr./min varv/min omw/min rev./min об/мин".split()
+    "rpm 1/min min-1 min^-1 min⁻¹ u/min umin r/min rev/min tr/min t/min tpm ot/min ot./min otmin 1/minute giri/min "
+    "obr/min obr./min varv/min omw/min rev./min об/мин".split()
 )
 THOUSANDS = frozenset(("krpm", "rpm x1000", "rpm x 1000", "rpm*1000", "x1000 rpm", "1000 rpm", "1000/min"))
 """Of turns a minute."""
 TURNS = frozenset("rps u/s rev/s r/s tr/s ot/s".split())
-HERTZ = frozenset("hz 1/s s-1 s^-1".split()) | TURNS
+HERTZ = frozenset("hz 1/s s-1 s^-1 s⁻¹".split()) | TURNS
 OF_ROTATION = HERTZ | THOUSANDS | {"rad/s", "deg/s", "°/s"}
 ANGULAR_COLUMN = re.compile(
     r"^omega\d*$|winkelgeschw|kreisgeschw|angularvel|angularspeed|angvel|vitesseangul|uhlov\w*rychlost|velocidadangular"
