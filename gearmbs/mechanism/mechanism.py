@@ -267,7 +267,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         self,
         name: str,
         on: Body | Marker,
-        function: QuantityLike | TimeFunction,
+        function: QuantityLike | TimeFunction | Parameter,
         *,
         axis: Vector = (0, 0, 1),
         reaction: Body | None = None,
@@ -278,7 +278,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         ----------
         on : Body or Marker
             Body that feels the torque.
-        function : float or TimeFunction
+        function : float, TimeFunction or Parameter
             Value in N m; a number is a constant.
         axis : array_like
             Direction at the initial position, global components.
@@ -291,7 +291,9 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         self._check_body(f"torque '{name}'", against)
         frame = frame_along(axis, f"torque '{name}': axis")
         other = against.marker_at(marker.global_position(), frame, name=f"{name}.J")
-        return self.add(Torque(name, marker, other, other, as_function(function, "torque", f"torque '{name}'")))
+        label = f"torque '{name}'"
+        value = self._text(label, function, "torque") if isinstance(function, Parameter) else function
+        return self.add(Torque(name, marker, other, other, as_function(value, "torque", label)))
 
     def gear_contact(
         self, name: str, wheel_1: Body | Marker, wheel_2: Body | Marker, pair: ContactPair, carrier: Body | None = None

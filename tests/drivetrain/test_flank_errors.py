@@ -138,9 +138,21 @@ def test_equal_names_of_states_and_wrong_speeds():
     plant = m.linearize([("transmission_error", "mesh", "acceleration")], [("joint_rate", "one pin")])
     assert len(set(plant.states)) == len(plant.states)
     assert plant.states[-2:] == [f"transmission_error mesh acceleration ({one})" for one in ("position", "rate")]
+    both = m.linearize([("transmission_error", "mesh"), ("transmission_error", "mesh", "position", 50.0)], [])
+    assert list(both.inputs) == ["transmission_error mesh", "transmission_error mesh of the angle"]
     for speed, words in ((0.0, says("'mesh'", "0 rad/s")), ("3 m", says("'mesh'", "rad/s"))):
         with pytest.raises(ModelError, match=words):
             m.linearize([("transmission_error", "mesh", "position", speed)], [])
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_speed_of_an_error_that_goes_with_the_angle_is_held_against_the_point(sense):
+    m = at_rest()
+    for body, share in zip(("one", "two"), (1.0, -1.0 / 3.0), strict=True):
+        m.bodies[body].angular_velocity = (0.0, 0.0, 40.0 * sense * share)
+    m.linearize([("transmission_error", "mesh", "position", 50.0 * sense)], [])
+    with pytest.raises(ModelError, match=says("'transmission_error mesh of the angle'", f"{-50 * sense:g} rad/s")):
+        m.linearize([("transmission_error", "mesh", "position", -50.0 * sense)], [])
 
 
 def test_a_mesh_that_carries_nothing_is_told_of():

@@ -136,7 +136,8 @@ def test_inputs_and_parameters_stand_in_forces_as_they_are():
         (lambda m, d, p: m.axis_torque("t", p.i, p.j, m.parameter("k", "N", 1.0)), ("sforce 't'", "'k'", "N*m")),
         (lambda m, d, p: m.axis_torque("t", p.i, p.j, Mechanism("o").parameter("k", "N m", 1.0)), ("'k'", "parameter")),
         (lambda m, d, p: m.torsion_spring("s", p.i, p.j, stiffness=m.parameter("k", "N m/rad", 1.0)), ("'s'", "'2*k'")),
-        (lambda m, d, p: m.torque("t", d, m.parameter("k", "N m", 1.0)), ("'t'", "'2*k'")),
+        (lambda m, d, p: m.rotation("r", p, m.parameter("k", "rad", 1.0)), ("'r'", "'2*k'")),
+        (lambda m, d, p: m.torque("t", d, m.parameter("k", "N", 1.0)), ("'t'", "'k'", "N*m")),
         (lambda m, d, p: m.torque("t", d, lambda t: 3.0), ("'t'", "m.function", "F(TIME)")),
         (lambda m, d, p: m.rotation("r", p, lambda t: 3.0), ("'r'", "m.function", "F(TIME)")),
         (lambda m, d, p: (m.parameter("u", "N", 1.0), m.torque("t", d, make_input("u", "N m"))), ("'u'", "parameters")),
@@ -170,3 +171,17 @@ def test_a_name_that_is_a_list_is_none_of_an_output():
     m.output("speed", ("angular_velocity", "disc", "z"))
     with pytest.raises(KeyError, match=says("['speed']", "the outputs are speed")):
         gm.Simulator(m, 1.0).get("output", ["speed"])
+
+
+def test_a_parameter_is_a_torque():
+    """2 w' = 3, then -1."""
+    m, body, _ = disc()
+    m.torque("drive", body, m.parameter("T", "N m", 3.0))
+    sim = gm.Simulator(m, 1.0)
+    sim.advance(0.2)
+    sim.set("T", -1.0)
+    sim.advance(0.4)
+    assert sim.get("angular_velocity", "disc")[2] == pytest.approx(0.2 * 1.5 - 0.2 * 0.5, rel=1e-6)
+    other, disc_of_other, _ = disc()
+    with pytest.raises(ModelError, match=says("torque 'drive'", "'T'", "parameter")):
+        other.torque("drive", disc_of_other, m.parameters["T"])

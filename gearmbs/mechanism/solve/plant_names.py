@@ -224,9 +224,10 @@ class PlantNames:
             turns = quantity(speed, "rad/s", label)
             if not (np.isfinite(turns) and turns):
                 raise ModelError(f"{label} is {turns:g} rad/s; give the one that it turns at, or leave it out")
+        name = f"transmission_error {element.name}{' of the angle' if turns else ''}"
         one = Given(
-            "transmission_error", f"transmission_error {element.name}", "m", _one_of("level", level, LEVELS), "m",
-            element=element, lever=levers(element)[1], speed=turns,
+            "transmission_error", name, "m", _one_of("level", level, LEVELS), "m", element=element,
+            lever=levers(element)[1], speed=turns,
         )  # fmt: skip
         return _at_level(one)
 

@@ -38,6 +38,8 @@ INPUT_STEP = 1e-3
 what is not 1e-12 of its fifth derivative is left out."""
 DIFFERENCE = ((1.0, 8.0 / 12.0), (-1.0, -8.0 / 12.0), (2.0, -1.0 / 12.0), (-2.0, 1.0 / 12.0))
 """Central differences of fourth order: places in steps, and their weights."""
+STANDING = 0.01
+"""Part of the speed that is told for a wheel up to which it counts as standing: swings of one at rest are below."""
 TURNS = 1e-6
 """Speed of a wheel, rad/s, up to which it rests: a mesh cycle takes a week."""
 TOLD = "plant output {}"
@@ -287,6 +289,13 @@ class _Columns:
         force, torque = self.instant.y[rows[:3]], self.instant.y[rows[-3:]]
         radius, other, _ = levers(given.element)
         axis = first.axes[:, 2]
+        spin = float(self.instant.pose()[first.body, POSE_W:] @ axis)
+        carried = given.element.name in self.mechanism.carriers
+        if spin * given.speed < 0.0 and abs(spin) > STANDING * abs(given.speed) and not carried:
+            raise ModelError(
+                f"input {given.name!r}: the speed of the first wheel is given as {given.speed:.6g} rad/s, and at this "
+                f"point it is {spin:.6g} rad/s; give that, or a point where it turns the other way"
+            )
         share = -float(torque @ axis) / (radius * given.speed)
         self._push(rate, first, first.place, axis, True, share)
         if share == 0.0:
