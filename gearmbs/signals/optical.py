@@ -26,10 +26,11 @@ from gearmbs.signals.signal.signal import like, rate_of, units_of
 from gearmbs.signals.signal.units import DIMENSIONS, unit_dimension
 from gearmbs.units import Quantity, to_si
 
-FEWEST_BLOWS, MOSTLY = 8, 0.9
-"""Spikes, and the share of them, that come at even times: of chance eight within a sample or two never do."""
-EVEN_SAMPLES, LIKE = 1.5, 0.25
-"""Samples by which their times may be uneven, and the part of their mean by which heights scatter."""
+FEWEST_BLOWS = 8
+"""Spikes among which some are looked for that recur."""
+UNEVEN, SKIPPED = 0.015, 3
+"""Part by which the time between blows may differ (swings of the speed, slip of bearings), and how many others, of a
+second defect or of light that fails, may stand between."""
 MEMORY = 100
 """Samples from which the next is predicted: three periods of a mesh line at 30 samples each."""
 ROUNDS = 3
@@ -130,8 +131,7 @@ def repair_vibrometer(
         column = signal.values[:, names.index(name)]
         bound = None if full_scale is None else _in_unit(full_scale, units_of(signal)[names.index(name)])
         lost, found, again = _lost(column, dark, bound, spikes)
-        if again is not None:
-            notes.append(_recurring_said(name, again, rate))
+        notes += [_recurring_said(name, one, rate) for one in again]
         share = float(lost.mean())
         over = float(found["over the range"].mean())
         if over > MOST_LOST:
@@ -167,7 +167,7 @@ def repair_vibrometer(
 
 def _lost(
     column: np.ndarray, dark: np.ndarray, bound: float | None, spikes: float | None
-) -> tuple[np.ndarray, dict[str, np.ndarray], _Recurring | None]:
+) -> tuple[np.ndarray, dict[str, np.ndarray], list[_Recurring]]:
     """Return which samples of a channel are lost with their neighbours, which were found by what, and what recurs."""
     found = {
         "dark": dark,
@@ -187,9 +187,9 @@ def _lost(
         found["spikes"] |= more
         told |= more
         lost = _widened(told)
-    again = _recurring(column, found["spikes"], lost)
-    if again is not None:
-        found["spikes"] = np.zeros_like(dark)
+    again, spared = _recurring(column, found["spikes"], lost)
+    if again:
+        found["spikes"] &= ~spared
         lost = _widened(np.any(list(found.values()), axis=0))
     return lost, found, again
 
@@ -202,28 +202,53 @@ class _Recurring(NamedTuple):
     height: float
 
 
-def _recurring(column: np.ndarray, spikes: np.ndarray, lost: np.ndarray) -> _Recurring | None:
-    """Return spikes at even times and of like heights, as blows are and light that fails by chance is not."""
+def _recurring(column: np.ndarray, spikes: np.ndarray, lost: np.ndarray) -> tuple[list[_Recurring], np.ndarray]:
+    """Return families of spikes that recur, as blows do and light that fails by chance does not, and their samples."""
+    families: list[_Recurring] = []
+    spared = np.zeros_like(spikes)
     places = _stretches(spikes)
     if len(places) < FEWEST_BLOWS:
-        return None
+        return families, spared
     off = column - _bridged(column, lost)
     at = np.array([a + int(np.argmax(np.abs(off[a:b]))) for a, b in places])
-    heights = off[at]
-    period = float(np.median(np.diff(at)))
-    turn = np.round((at - at[0]) / period)
-    if turn[-1] < 1.0:
-        return None
-    period, start = np.polyfit(turn, at, 1)
-    even = np.mean(np.abs(at - start - period * turn) <= EVEN_SAMPLES) >= MOSTLY
-    often = at.size >= MOSTLY * (turn[-1] + 1.0)
-    alike = float(np.std(heights)) <= LIKE * abs(float(np.mean(heights)))
-    return _Recurring(at.size, float(period), float(np.mean(heights))) if even and often and alike else None
+    rest = np.arange(at.size)
+    while rest.size >= FEWEST_BLOWS:
+        own, period = _family(at[rest])
+        # of chance 2 x 3 lags x 2 x UNEVEN = 0.18 n have another one there, with a scatter of some roots of n
+        if own.sum() < 0.3 * rest.size + 1.5 * math.sqrt(rest.size):
+            break
+        families.append(_Recurring(int(own.sum()), period, float(np.mean(off[at[rest[own]]]))))
+        for k in rest[own]:
+            spared[slice(*places[k])] = True
+        rest = rest[~own]
+    return families, spared
+
+
+def _family(at: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return which spikes have another one a period before or behind, and the period by which most do, in samples.
+
+    The period is the same for the whole record, or that of two intervals one behind the other, as in run-ups.
+    """
+    n = at.size
+    pairs = [(k, np.arange(n - k), at[k:] - at[:-k]) for k in range(1, SKIPPED + 1)]
+    lags = np.sort(np.concatenate([lag for *_, lag in pairs]))
+    many = np.searchsorted(lags, lags * (1.0 + UNEVEN), side="right") - np.searchsorted(lags, lags * (1.0 - UNEVEN))
+    period = float(lags[int(np.argmax(many))])
+    own = np.zeros(n, dtype=bool)
+    for k, first, lag in pairs:
+        near = first[np.abs(lag - period) <= max(UNEVEN * period, 1.0)]
+        own[near] = own[near + k] = True
+    between = np.diff(at)
+    even = np.flatnonzero(np.abs(np.diff(between)) <= np.maximum(UNEVEN * between[1:], 1.0))
+    running = np.zeros(n, dtype=bool)
+    for k in range(3):
+        running[even + k] = True
+    return (running, float(np.median(between))) if running.sum() > own.sum() else (own, period)
 
 
 def _recurring_said(name: Any, again: _Recurring, rate: float) -> str:
     return (
-        f"{name}: {again.number} spikes recur every {again.period / rate:.6g} s with like heights, {again.height:.3g} "
+        f"{name}: {again.number} spikes recur every {again.period / rate:.6g} s, {again.height:.3g} high "
         "on average: blows do, and dark places of a turning shaft; they are left as they are. Of the latter a "
         "full_scale below them (--full-scale) bridges them."
     )
@@ -259,8 +284,7 @@ def instrument_faults(signal: xr.DataArray, beside: Sequence[str] = ()) -> list[
         if seen or not _known_unit(unit) or unit_dimension(unit)[0] != "velocity" or np.ptp(column) == 0.0:
             continue
         lost, found, again = _lost(column, np.zeros(column.size, dtype=bool), None, SPIKE)
-        if again is not None:
-            remarks.append(_recurring_said(name, again, rate_of(signal)))
+        remarks += [_recurring_said(name, one, rate_of(signal)) for one in again]
         if lost.any():
             remarks.append(
                 f"DROP-OUTS: {name} has {_told(lost, found, rate_of(signal))}, as lasers have; all levels are wrong by "

@@ -282,6 +282,69 @@ def test_knocks_of_one_sample_that_recur_are_no_drop_outs(share):
     np.testing.assert_allclose(repaired.values, knocks.values)
     assert any(re.search(says("laser", "recur", "blows"), note) for note in repaired.attrs["notes"])
     moved = sound.copy()
-    moved.values[at + np.random.default_rng(0).integers(-40, 40, at.size), 0] += share * 0.2
+    chance = np.random.default_rng(0).choice(np.arange(200, sound.sizes["time"] - 200, 20), at.size, replace=False)
+    moved.values[chance, 0] += share * 0.2
     back = repair_vibrometer(moved)
     assert np.abs(back.values - sound.values).max() < 0.1 * share * 0.2
+
+
+TURN, LONG = 0.04, 3.0
+SWAY = np.linspace(0.0, LONG, 2000)
+
+
+def blows(times, drops, seed_of=0):
+    """A laser's record with blows of one sample at some times, and light that fails by chance."""
+    rng = np.random.default_rng(seed_of)
+    n = round(LONG * RATE)
+    t = np.arange(n) / RATE
+    clean = 1e-3 * np.cos(575.0 * math.tau * t) + 2e-5 * rng.standard_normal(n)
+    at = np.unique(np.round(np.asarray(times) * RATE).astype(int))
+    at = at[(at > 200) & (at < n - 200)]
+    lost = rng.choice(np.setdiff1d(np.arange(200, n - 200, 10), at), drops, replace=False)
+    values = clean.copy()
+    values[at] += 0.02 * (1.0 + 0.3 * rng.standard_normal(at.size))
+    values[lost] += 0.04 * rng.choice([-1.0, 1.0], drops)
+    back = repair_vibrometer(make_signal(values[:, None], RATE, units=["m/s"], channels=["laser"]))
+    notes = [note for note in back.attrs["notes"] if "recur" in note]
+    kept = np.abs(back.values[at, 0] - values[at]) < 1e-3
+    return kept, np.abs(back.values[lost, 0] - clean[lost]) < 2e-3, notes
+
+
+@pytest.mark.parametrize(
+    ("times", "families"),
+    [
+        (np.arange(0.01, LONG, TURN), 1),
+        (np.r_[np.arange(0.01, LONG, TURN), np.arange(0.023, LONG, TURN)], 1),
+        (np.r_[np.arange(0.01, LONG, TURN), np.arange(0.02, LONG, 0.1165)], 2),
+        (np.interp(np.arange(75) * TURN, SWAY + 1.6e-3 * np.sin(3.1 * SWAY), SWAY), 1),
+        (np.interp(np.arange(110), 25.0 * SWAY + 25.0 / 6.0 * SWAY**2, SWAY), 1),
+        (np.cumsum(1.0 / 107.5 * (1.0 + 0.01 * np.random.default_rng(2).standard_normal(320))), 1),
+    ],
+    ids=["once a turn", "two defects", "two wheels", "a speed that sways", "a run-up", "slip"],
+)
+@pytest.mark.parametrize("drops", [0, 5])
+def test_blows_that_recur_are_left_and_light_that_fails_beside_them_is_bridged(times, families, drops):
+    """One of five that fails where a blow may be is left, too."""
+    kept, bridged, notes = blows(times, drops)
+    assert kept.mean() > 0.97
+    assert len(notes) == families
+    assert bridged.sum() >= drops - 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [np.arange(0.01, LONG, TURN), np.cumsum(np.full(320, 1.0 / 107.5))])
+def test_blows_are_left_where_light_fails_often(times):
+    """But for one or two blows that light fails beside, which are bridged with it."""
+    kept, bridged, notes = blows(times, 30)
+    assert (~kept).sum() <= 2
+    assert len(notes) == 1
+    assert bridged.mean() > 0.85
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("drops", [8, 30, 120])
+def test_light_that_fails_by_chance_recurs_at_no_time(drops):
+    for k in range(5):
+        _, bridged, notes = blows([], drops, k)
+        assert notes == []
+        assert bridged.mean() > 0.97
