@@ -22,6 +22,8 @@ FEWEST_ORDERS = 8
 """Orders from which the scatter of a regression is known to a quarter of itself."""
 QUARTERS = 4
 """Turns of which a record of torsional vibration is a multiple: half and quarter orders are lines of its spectrum."""
+FEWEST_TURNS = 16
+"""Turns from which orders of a half and a quarter are there to 2 %, and leave no more beside them; 12: 5 %, 5: half."""
 NEIGHBOURS = 33
 """Orders whose median is the level that a line stands in: as many as `levels.LEVEL_LINES` and its own."""
 
@@ -151,6 +153,12 @@ def torsional_vibration(train: PulseTrain, marks: Any = None) -> xr.DataArray:
         f"{train.name}: {train.lines} lines show orders below {top:g}; what the shaft has from there on is folded "
         f"down, as order {train.lines - 1} onto 1, and nothing tells it from orders below."
     )
+    notes = [*train.notes, folded_down]
+    if train.turns < FEWEST_TURNS:
+        notes.append(
+            f"{train.name}: in {train.turns:.3g} turns orders below 1 are there in part, the rest taken for slow "
+            f"turning, and orders beside them have some of it; {FEWEST_TURNS} turns hold halves and quarters."
+        )
     return xr.DataArray(
         found.values[:count, None],
         dims=("angle", "channel"),
@@ -160,7 +168,7 @@ def torsional_vibration(train: PulseTrain, marks: Any = None) -> xr.DataArray:
             "units": "rad",
             "mean_speed": train.mean_speed,
             "highest_order": top,
-            "notes": [*train.notes, folded_down],
+            "notes": notes,
         },
     )
 

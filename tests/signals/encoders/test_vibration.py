@@ -85,6 +85,17 @@ def test_half_and_quarter_orders_are_lines_of_the_spectrum(order, turns):
     assert float(found.sel(order=order, method="nearest")[0]) == pytest.approx(1e-3, rel=0.03 if order < 1.0 else 0.005)
 
 
+@pytest.mark.parametrize(("turns", "told"), [(5, True), (9, True), (17, False), (40, False)])
+def test_records_too_short_for_half_orders_say_so(turns, told):
+    found = torsional_vibration(train(0.5, turns))
+    lines = order_spectrum(found)
+    half, quarter = (float(lines.sel(order=order, method="nearest")[0]) for order in (0.5, 0.25))
+    assert any(re.search(says("encoder", "orders below 1"), note) for note in found.attrs["notes"]) == told
+    if not told:
+        assert half == pytest.approx(1e-3, rel=0.02)
+        assert quarter < 2e-5
+
+
 def test_what_marks_cannot_show_is_in_the_attributes():
     """Order 40 of 60 marks is folded onto 20."""
     found = torsional_vibration(train(40.0))
