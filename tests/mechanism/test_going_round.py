@@ -139,3 +139,19 @@ def test_flexible_shafts_on_rolling_bearings_go_on_bit_for_bit(tmp_path):
             other.advance(t)
         np.testing.assert_array_equal(other.solution().result.y[-10:], one.result.y[11:])
     np.testing.assert_array_equal(sim.solution().result.y, one.result.y)
+
+
+def test_a_simulator_made_with_a_state_counts_on():
+    """Of a free shaft, whose turns nothing in the model counts, as far as the first one has been asked for them."""
+    m = machine()
+    first = gm.Simulator(m, 1.0)
+    for k in range(1, 61):
+        first.advance(k * 5e-3)
+        before = [first.get("joint_angle", "free pin"), first.get("output", "turned")]
+    other = gm.Simulator(m, 1.0, initial=first.state())
+    assert abs(before[0]) > 4.0 * np.pi
+    for sim in (first, other):
+        assert [sim.get("joint_angle", "free pin"), sim.get("output", "turned")] == pytest.approx(before, abs=1e-12)
+        sim.advance(0.305)
+    after = [[sim.get("joint_angle", "free pin"), sim.get("output", "turned")] for sim in (first, other)]
+    assert after[0] == pytest.approx(after[1], abs=1e-9)

@@ -167,11 +167,7 @@ class Restored(Told):
             first, origin = self._own_point(state), (self._problem, self._origin)
             kept = self._points[: first + 1] if first is not None else []
             self._begin_in(state)
-            self._equations = self._equations or equations_of(self._base)
-            if state.history is not None and state.is_own and state.history.equations == self._equations:
-                # turns that no point of the solution knows
-                mark: Mark | None = getattr(state.history.numbers, "mark", None)
-                self._counted = {} if mark is None else dict(mark.counted)
+            self._take_counts(state)
             if kept:
                 # what stood there up to the state, which a jump may follow
                 self._problem, self._origin = origin
@@ -201,6 +197,15 @@ class Restored(Told):
             own.update(before)
             self._settings.put_back(set_before)
             raise ModelError(f"restore: {failure[1]}")
+
+    def _take_counts(self, state: State) -> None:
+        """Take the turns that a simulator of the same equations has counted, of which no point here knows."""
+        mark: Mark | None = None if state.history is None else getattr(state.history.numbers, "mark", None)
+        if mark is None or not state.is_own or state.history is None:
+            return
+        self._equations = self._equations or equations_of(self._base)
+        if state.history.equations == self._equations:
+            self._counted = dict(mark.counted)
 
     def _take_given(self, state: State) -> None:
         """Let what belongs to a state be what has been set."""

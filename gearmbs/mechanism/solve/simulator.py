@@ -210,6 +210,7 @@ class Simulator(Sampled, Restored, Guessed):
         self._begin(initial)
         self._t_start = self.t
         if initial is not None:
+            self._take_counts(initial)
             self._take_given(initial)
             self._unmet = list(initial.controllers)
 
