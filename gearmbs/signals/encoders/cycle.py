@@ -45,7 +45,9 @@ def noise_within(numbers: np.ndarray, variances: np.ndarray, probability: float)
 def fall(numbers: np.ndarray, values: np.ndarray, variances: np.ndarray) -> float:
     """Return a of lines that fall as a/h^2 and add up at a corner: by the highest octave that stands clear of noise.
 
-    Its harmonics n + 1 to 2 n come to a/(2 n) there.
+    Its harmonics n + 1 to 2 n come to a/(2 n) there. It is an estimate: lines of a ramp vanish where it is as long as
+    they are, and if that is in this octave a is up to five times too small (trapezoids of 0.1 and 0.2 of a cycle); the
+    largest of three octaves would hold there, and be twice too large for rounded corners, as the paper's pair has.
 
     Parameters
     ----------

@@ -328,8 +328,10 @@ class MeasuredTransmissionError(Shown):
         -------
         DataFrame
             ``harmonics``, the highest taken; ``noise`` (m), below which their noise stays all over the cycle with the
-            result's probability; ``missing`` (m), what those that are not taken add up to at a corner at most; and
-            ``within``, the sum of both. With `within`, the ``seconds`` in mesh (and as many times as long free)
+            result's probability; ``missing`` (m), what those that are not taken add up to at a corner, as the highest
+            octave that stands clear of noise foretells (a ramp of whose length its harmonics are hides there, and steps
+            shorter than the highest are not known of); and ``within``, the sum of both. With `within`, the ``seconds``
+            in mesh (and as many times as long free)
             by which the sum is as small; infinite where harmonics are missing or marks unknown.
 
         Raises
