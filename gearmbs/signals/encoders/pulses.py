@@ -15,8 +15,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from gearmbs.signals.encoders.turns import counted_turns, doubtful_turns, turns_between
 from gearmbs.signals.errors import SignalError
-from gearmbs.signals.rotation.phase import described, mended_count, pulse_edges, pulse_faults
+from gearmbs.signals.rotation.phase import PulseFault, described, mended_count, pulse_edges, pulse_faults
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 
 TURN = 2.0 * math.pi
@@ -30,6 +31,13 @@ FEWEST_GAPS, ALIKE = 3, 0.8
 """Distances of missing pulses, and the share of them that is the same, from which these are no chance."""
 INDEX_REACH = 1.0
 """Pitches within which a pulse must follow an index pulse to be that of mark 0."""
+
+
+MANY_MENDED, MENDED_SHARE = 4, 0.003
+"""Pulses, and their share, that are mended by intervals alone from which the count is doubted: of 60 marks off by a
+fifth of the pitch, 0.5 % of the pulses lost, 8 of 20 records were miscounted."""
+ENOUGH = 0.5
+"""Share of the pulses that must be at marks where index pulses count them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +120,10 @@ def pulse_train(
 ) -> PulseTrain:
     """Number the pulses of an encoder, a tacho or reflecting marks.
 
-    Missing and extra pulses are told from the intervals beside them and mended (`gearmbs.signals.rotation.phase`). A
-    mark that is missing in every turn is one that the disc lacks: it is mark 0 unless index pulses say which is.
+    Missing and extra pulses are told from the intervals beside them and mended (`gearmbs.signals.rotation.phase`), with
+    index pulses turn by turn against the turns that are whole (`gearmbs.signals.encoders.turns`). Without them a count
+    that intervals leave unsure has a remark, CHECK THE COUNT. A mark that is missing in every turn is one that the disc
+    lacks: it is mark 0 unless index pulses say which is.
 
     Parameters
     ----------
@@ -170,13 +180,22 @@ def pulse_train(
     at, lost = (at, []) if faults == "keep" else _ends_with_others(at, int(lines), name)
     if lost and faults == "refuse":
         raise SignalError(f"faults: {' '.join(lost)} Mend them with faults='mend', or take them with faults='keep'")
-    found = [] if faults == "keep" else pulse_faults(at, float(lines))
-    words = [f"{name}: {text}" for text in described(at, found)]
+    once = None if index is None else np.asarray(index, dtype=float)
+    found: list[PulseFault] = []
+    by_turns = None if once is None or faults == "keep" else counted_turns(at, int(lines), once)
+    if by_turns is not None:
+        kept, counted = by_turns.kept, by_turns.numbers
+        words = _said_of_turns(at, kept, counted, by_turns.unread, name)
+    else:
+        found = [] if faults == "keep" else pulse_faults(at, float(lines))
+        words = [f"{name}: {text}" for text in described(at, found)]
+        kept, counted = mended_count(at.size, found)
     if words and faults == "refuse":
         raise SignalError(f"faults: {' '.join(words)} Mend them with faults='mend', or take them with faults='keep'")
-    kept, counted = mended_count(at.size, found)
     train = PulseTrain(at[kept], counted.astype(np.int64), int(lines), name=name)
-    train, words = _referenced(train, None if index is None else np.asarray(index, dtype=float), lost + words)
+    train, words = _referenced(train, once, lost + words, by_turns is not None)
+    if by_turns is None and faults != "keep":
+        words = [*words, *_doubts(train, found)]
     if tooth_at_zero is not None:
         number, step = tooth_at_zero
         train = replace(train, tooth_at_zero=(float(number), math.copysign(1.0, step)))
@@ -201,8 +220,63 @@ def _ends_with_others(at: np.ndarray, lines: int, name: str) -> tuple[np.ndarray
     return at, said
 
 
-def _referenced(train: PulseTrain, index: np.ndarray | None, words: list[str]) -> tuple[PulseTrain, list[str]]:
-    """Number the marks from the index pulses, or from the mark that the disc lacks."""
+def _said_of_turns(
+    at: np.ndarray, kept: np.ndarray, numbers: np.ndarray, unread: list[tuple[float, float]], name: str
+) -> list[str]:
+    """Return what is to be said of pulses that index pulses count."""
+    if kept.size < ENOUGH * at.size:
+        raise SignalError(
+            f"index: {at.size - kept.size} of {at.size} pulses of {name!r} fit no mark of a disc whose marks recur "
+            "with each turn; check the lines and the threshold, or take the pulses as they are with faults='keep'"
+        )
+    spaces, apart = np.diff(numbers), np.diff(kept)
+    places = [
+        PulseFault(int(kept[k]), int(kept[k + 1]), int(spaces[k]), float(spaces[k]))
+        for k in np.flatnonzero((spaces != apart) | (apart > 1))
+    ]
+    words = [f"{name}: {text}" for text in described(at, places)]
+    beside = sum(place.missing == 0 for place in places)
+    beside += int(kept[0] > 0) + int(kept[-1] < at.size - 1)
+    if beside:
+        spots = [place for place in places if place.missing == 0]
+        where = ", ".join(f"{at[p.first]:.6g} to {at[p.last]:.6g} s" for p in spots[:3]) or "the ends of the record"
+        words.append(
+            f"{name}: pulses are at no sure mark at {beside} place{'s' * (beside > 1)} ({where}), as where one is "
+            "missing and another too many; index pulses give the count, and these pulses are left out."
+        )
+    if unread:
+        words.append(
+            f"{name}: CHECK THE PULSES: no pulse fits a mark in {len(unread)} turns between index pulses, the first "
+            f"{unread[0][0]:.6g} to {unread[0][1]:.6g} s; they are left out."
+        )
+    return words
+
+
+def _doubts(train: PulseTrain, found: list[PulseFault]) -> list[str]:
+    """Return a remark where turns do not recur as they are numbered, or too much was mended by intervals alone."""
+    shifted, unlike, at_ends, turns = doubtful_turns(train.numbers, train.times, train.lines)
+    own = np.bincount(np.setdiff1d(np.arange(train.numbers[0], train.numbers[-1]), train.numbers) % train.lines)
+    lacking = own > max(1.0, SAME_MARK * (train.turns - 1.0))
+    mended = sum(abs(place.missing) for place in found) - int(own[lacking].sum())
+    tangled = sum(place.spaces is not None and place.spaces > 1 and place.last - place.first > 1 for place in found)
+    many = mended >= MANY_MENDED and mended > MENDED_SHARE * train.numbers.size
+    what = [f"{shifted} of {turns} turns fit the others only with other numbers"] * bool(shifted)
+    what += [f"{unlike} intervals are unlike those of the same mark in other turns"] * bool(unlike)
+    what += ["an interval near an end is unlike those of its mark"] * bool(at_ends)
+    what += [f"{mended} pulses of {train.numbers.size} were mended by the intervals beside them alone"] * many
+    what += [f"pulses between others at {tangled} places fit no mark"] * (tangled > 0 and not lacking.any())
+    if not what:
+        return []
+    return [
+        f"{train.name}: CHECK THE COUNT: {' and '.join(what)}, so that turns, speed and the numbers of marks may be "
+        "wrong; record index pulses and give them with index=..., or raise the level of the weak marks."
+    ]
+
+
+def _referenced(
+    train: PulseTrain, index: np.ndarray | None, words: list[str], sure: bool = False
+) -> tuple[PulseTrain, list[str]]:
+    """Number the marks from the index pulses, by which they may be surely counted, or from one that the disc lacks."""
     if index is not None:
         after = np.searchsorted(train.times, index)
         after = after[(after > 0) & (after < train.times.size)]
@@ -212,13 +286,21 @@ def _referenced(train: PulseTrain, index: np.ndarray | None, words: list[str]) -
         # an index pulse at the same instant as a mark may come a tick before or behind it
         zero = int(marks[0])
         apart = (marks - zero + train.lines // 2) % train.lines - train.lines // 2
+        if sure:
+            zero += round(float(np.median(apart)))
+            return replace(train, numbers=train.numbers - zero, referenced=True), words
         gaps = np.diff(train.numbers[after])
         turns = max(1, round(float(gaps.sum() / max(gaps.min(), 1)))) if gaps.size else 1
         every = round(float(gaps.sum() / turns)) if gaps.size else train.lines
-        if np.abs(apart).max() > INDEX_REACH or abs(every - train.lines) > INDEX_REACH:
+        inside = np.sort(index[(index > train.times[0]) & (index <= train.times[-1])])
+        between = turns_between(inside, gaps, train.lines) if inside.size == after.size else None
+        drift = 0.0
+        if between is not None and gaps.size:
+            drift = float(np.ptp(np.concatenate(([0], np.cumsum(gaps - train.lines * between)))))
+        if drift > INDEX_REACH or np.abs(apart).max() > INDEX_REACH or abs(every - train.lines) > INDEX_REACH:
             raise SignalError(
                 f"index: pulses of {train.name!r} come once in about {every} marks, not once in {train.lines}; check "
-                "the lines, or leave index out"
+                "the lines and, where turns lack pulses, the threshold and the marks, or leave index out"
             )
         zero += round(float(np.median(apart)))
         return replace(train, numbers=train.numbers - zero, referenced=True), words
