@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import dis
-import gc
 import importlib.util
 import pkgutil
 import re
@@ -58,12 +57,14 @@ def import_all(package: str = "gearmbs") -> None:
 
 def kernels(modules: Iterable[str]) -> list[Kernel]:
     """Return the kernels defined in some modules, which are imported."""
-    names = set(modules)
-    for name in names:
-        importlib.import_module(name)
-    # by the type, for what a weak proxy stands for may be gone
-    found: list[Kernel] = [k for k in gc.get_objects() if issubclass(type(k), Kernel)]
-    return sorted((k for k in found if k.__module__ in names and k == find(k.__module__, k.__name__)), key=address)
+    found = {
+        address(one): one
+        for name in sorted(set(modules))
+        for one in vars(importlib.import_module(name)).values()
+        # by the type, for what a weak proxy stands for may be gone
+        if issubclass(type(one), Kernel) and one.__module__ == name and one is find(name, one.__name__)
+    }
+    return [found[key] for key in sorted(found)]
 
 
 def find(module: str, name: str) -> Kernel | None:
