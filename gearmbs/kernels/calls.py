@@ -57,13 +57,12 @@ def import_all(package: str = "gearmbs") -> None:
 
 def kernels(modules: Iterable[str]) -> list[Kernel]:
     """Return the kernels defined in some modules, which are imported."""
-    found = {
-        address(one): one
-        for name in sorted(set(modules))
-        for one in vars(importlib.import_module(name)).values()
-        # by the type, for what a weak proxy stands for may be gone
-        if issubclass(type(one), Kernel) and one.__module__ == name and one is find(name, one.__name__)
-    }
+    found: dict[str, Kernel] = {}
+    for name in sorted(set(modules)):
+        for own in list(vars(importlib.import_module(name))):
+            one = find(name, own)
+            if one is not None and one.__module__ == name and one is find(name, one.__name__):
+                found[address(one)] = one
     return [found[key] for key in sorted(found)]
 
 

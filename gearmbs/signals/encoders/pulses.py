@@ -15,9 +15,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from gearmbs.signals.encoders.turns import counted_turns, doubtful_turns, turns_between
+from gearmbs.signals.encoders.turns import counted_turns, turns_between
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.phase import PulseFault, described, mended_count, pulse_edges, pulse_faults
+from gearmbs.signals.rotation.recurring import doubtful_turns
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 
 TURN = 2.0 * math.pi

@@ -16,6 +16,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
+from gearmbs.signals.rotation.recurring import doubtful_turns
 from gearmbs.signals.rotation.uneven_marks import uneven_faults
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.given import speed_curve
@@ -154,9 +155,17 @@ def phase_from_tacho(
     notes = [f"Tacho {name!r}: {words}" for words in described(edges, places)]
     if notes and faults == "refuse":
         raise SignalError(f"faults: {' '.join(notes)} Mend them with faults='mend', or take them with faults='keep'")
+    kept_edges, numbers = mended_count(edges.size, places)
+    if faults != "keep" and pulses_per_rev >= 2 and float(pulses_per_rev).is_integer():
+        shifted, unlike, *_ = doubtful_turns(numbers, edges[kept_edges], int(pulses_per_rev))
+        if shifted or unlike:
+            notes.append(
+                f"Tacho {name!r}: CHECK THE COUNT: {shifted} turns and {unlike} intervals are unlike those of the same "
+                "marks in other turns, so that turns and speed may be wrong; raise the level of weak marks "
+                "(threshold=...), or use one mark a turn."
+            )
     for note in notes:
         warn(note, UserWarning)
-    kept_edges, numbers = mended_count(edges.size, places)
     edges, angles = edges[kept_edges], 2.0 * np.pi / pulses_per_rev * numbers
     inside = (times >= edges[0]) & (times <= edges[-1])
     phase = scipy.interpolate.CubicSpline(edges, angles)(times[inside])
