@@ -1,5 +1,8 @@
 from . import faults as faults
 from .contact_element import GearContact as GearContact
+from .elastic_rim import ElasticRim as ElasticRim
+from .elastic_rim import RimModes as RimModes
+from .elastic_rim import RingMeshes as RingMeshes
 from .geometry import PairGeometry as PairGeometry
 from .geometry import Placement as Placement
 from .ideal_mesh import IdealMesh as IdealMesh
@@ -11,9 +14,6 @@ from .mesh_tables import MeshTables as MeshTables
 from .mesh_tables import mesh_tables as mesh_tables
 from .pair import GearPair as GearPair
 from .planetary import planetary as planetary
-from .planetary_mechanism import ElasticRim as ElasticRim
-from .planetary_mechanism import RimModes as RimModes
-from .planetary_mechanism import RingMeshes as RingMeshes
 from .planetary_mechanism import Support as Support
 from .planetary_mechanism import planetary_mechanism as planetary_mechanism
 from .planetary_set import PlanetarySet as PlanetarySet

@@ -14,7 +14,8 @@ from typing import Any
 from gearmbs.bearings.designations.boundary import Size, size_of
 from gearmbs.bearings.designations.classes import CLASSES, HYBRID, mean_clearance, named_class
 from gearmbs.bearings.designations.estimate import Rating, estimated, usual_angle
-from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of, told_of
+from gearmbs.bearings.designations.others import told_of
+from gearmbs.bearings.kinds import KINDS, BearingError, Known, known_of
 from gearmbs.wording import warn
 
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.drivetrain.part import require
+from gearmbs.gears.elastic_rim import DEPTHS, UNIT, ElasticRim, RimModes
 from gearmbs.gears.ideal_mesh import IdealMesh
-from gearmbs.gears.planetary_mechanism import DEPTHS, UNIT, ElasticRim, RimModes
 from gearmbs.schema.described import check_keys
 
 if TYPE_CHECKING:
