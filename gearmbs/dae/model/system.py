@@ -66,6 +66,8 @@ def accelerations(
         last, inner = inner, _inner(y, found.loads, idata)
         y[int(idata[T.H_F]) :] = inner
         if (T.forces_in(idata)[:, T.FORCE_KIND] == T.REACTION).any():
+            # reactions read the markers' axes and arms, which this array has not seen yet
+            residual.update(t, y, y, idata, found.rdata, found.work)
             reactions_from(solution[base:].copy(), y, idata, found.rdata, found.work)
         inner = y[int(idata[T.H_F]) :].copy()
         if last is not None:

@@ -80,8 +80,7 @@ def build(kind: str) -> Mechanism:
                    yoke="i", **by, **lengths)  # fmt: skip
     elif kind.startswith("reaction"):
         joints = {
-            "reaction of a revolute joint": lambda: m.revolute("pin", i, j),
-            "reaction of a translational joint": lambda: m.translational("pin", i, j),
+            **{f"reaction of a {k} joint": lambda k=k: m.joint(k, "pin", i, j) for k in JOINTS},
             "reaction of a distance": lambda: m.distance("pin", i, j),
             "reaction of a screw": lambda: m.screw("pin", i, j, pitch=0.3),
             "reaction of a motion": lambda: m.rotation("pin", m.revolute("axle", i, j), ramp(3.0, over=0.7)),
@@ -107,7 +106,7 @@ LOADS = [
     "bushing",
     "field",
 ]
-REACTIONS = [f"reaction of a {k}" for k in ("revolute joint", "translational joint", "distance", "screw", "motion")]
+REACTIONS = [f"reaction of a {k}" for k in (*(f"{k} joint" for k in JOINTS), "distance", "screw", "motion")]
 FRICTIONS = [
     f"friction{by} {k}"
     for k in ("revolute", "translational", "cylindrical", "spherical", "universal")
