@@ -104,9 +104,9 @@ def axes_at(rows: np.ndarray) -> np.ndarray:
     return axes @ cylinder @ sphere
 
 
-def block_records(opened: Any, block: str) -> list[bytes]:
-    """Return the records of the last block of a name, without its head."""
-    opened.set_position(opened.dbnames[block][-1][0][0])
+def block_records(opened: Any, block: str, which: int = -1) -> list[bytes]:
+    """Return the records of one of the blocks of a name, by default of the last, without its head."""
+    opened.set_position(opened.dbnames[block][which][0][0])
     opened.rdop2nt()
     out = []
     while (data := opened.rdop2record("bytes")) is not None:
@@ -281,9 +281,9 @@ def bulk_grids(file: Path) -> GridTable | None:
         if block is None:
             return None
         integer, _ = word_kinds(opened)
-        records = _records(opened, block)
+        records = keyed_records(opened, block)
         scalar = next((r for name in ("GEOM2S", "GEOM2", "GEOM2N") if name in opened.dbnames
-                       for key, r in _records(opened, name) if key[:2] == SCALAR), b"")  # fmt: skip
+                       for key, r in keyed_records(opened, name) if key[:2] == SCALAR), b"")  # fmt: skip
     whole = {key[:2]: data for key, data in records}
     if GRID not in whole:
         return None
@@ -316,7 +316,7 @@ def bulk_grids(file: Path) -> GridTable | None:
     return GridTable(ids.astype(int), points, axes, np.array([row[:2] for row in dofs], dtype=int))
 
 
-def _records(opened: Any, block: str) -> list[tuple[tuple[int, ...], bytes]]:
+def keyed_records(opened: Any, block: str) -> list[tuple[tuple[int, ...], bytes]]:
     """Return key and content of each record of a block's last occurrence."""
     integer, _ = word_kinds(opened)
     head = 3 * int(integer[-1])

@@ -14,6 +14,7 @@ from gearmbs.flexible.material import FlexibleError
 from gearmbs.flexible.matrix_files import FileUnits, Path_
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
 from gearmbs.flexible.nastran import GridTable, block_records, op2_tables, pyyeti_module, word_kinds
+from gearmbs.flexible.nastran_masses import element_masses
 from gearmbs.flexible.reduction import nodal_lumps
 from gearmbs.flexible.stress import COMPONENTS, StressModes
 from gearmbs.units import Quantity
@@ -166,13 +167,15 @@ def _places(file: Path, kind: int, mode: int, words: np.ndarray) -> tuple[np.nda
     return places[..., 0].ravel(), stress.reshape(-1, len(COMPONENTS)).astype(float)
 
 
-MODES = ("OUGV1", "OUGV1PAT", "OUG1")
+MODES = ("OUGV1", "OUGV1PAT", "OUG1", "OPHIG")
 """Data blocks of mode shapes, in displacement coordinate systems."""
-BASIC_MODES = ("BOUGV1",)
+BASIC_MODES = ("BOUGV1", "BOPHIG")
 """The same in the basic coordinate system."""
 IDENTIFICATION, GRID_POINT = 146, 1
 """Words before the shapes of a mode, and the kind of point that has six displacements; scalar points are 2."""
 REAL_MODES = 2
+EIGENVALUE = 5
+"""Word of an identification that holds it."""
 ANALYSES = {
     1: "statics", 5: "frequency responses", 6: "a transient", 7: "prebuckling", 8: "buckling", 9: "complex modes",
     10: "nonlinear statics",
@@ -181,6 +184,10 @@ ANALYSES = {
 OTHER_EIGENVALUES = (("CLAMA", "complex modes"), ("BLAMA", "buckling"))
 ORTHOGONAL = 1e-3
 """Largest deviation of modes from orthogonality in the mass matrix, whose numbers have 4 bytes."""
+RESTING = 1.0
+"""Eigenvalue below zero, rad^2/s^2, up to which it is the rounding of a rigid motion: 0.16 Hz."""
+SLOWEST = 10
+"""Modes whose generalised mass is compared with that of the elements: faster ones live in rotations without a mass."""
 LUMPED = 2.0
 """Factor between the first generalised mass and that of lumped masses, where elements have consistent ones."""
 SAME_MASS = 1e-3
@@ -199,16 +206,17 @@ def read_op2_modes(
     """Return the modes of a Nastran op2 file as the content of a modal neutral file, in SI.
 
     Eigenvalues and shapes alone do not tell what a body weighs where: masses of the nodes come from the mass matrix of
-    the g-set in the file (MGG), or are given. That modes are orthogonal in them, and that they sum to what the grid
-    point weight generator printed, is checked.
+    the g-set in the file (MGG), from its elements (GEOM2, EPT, MPT), or are given. That modes are orthogonal in them,
+    and that they sum to what the grid point weight generator printed, is checked.
 
     Parameters
     ----------
     path : str or Path
-        With grid points (GEOM1, BGPDT), eigenvalues (LAMA) and shapes (OUGV1), as ``PARAM,POST,-1`` writes them.
+        With grid points (GEOM1, BGPDT) and shapes (OUGV1), as ``PARAM,POST,-1`` writes them. Without the table of
+        eigenvalues (LAMA) those of the shapes are taken, and their generalised masses in the masses of the nodes.
     masses : array_like of float, shape (N,), or matrix, shape (d, d), optional
         At the grid points in the order of their numbers, in the file's unit; or the mass matrix of the g-set in the
-        basic coordinate system. Default: MGG of the file.
+        basic coordinate system. Default: MGG of the file; without it those of its elements, lumped at their corners.
     inertias : array_like, shape (N, 3, 3), optional
         Of the grid points.
     length, mass_unit : float or str
@@ -232,29 +240,37 @@ def read_op2_modes(
     blocks = op2_tables(file, ["MGG"] if masses is None else [])
     table = blocks["grids"]
     lama = blocks.get("lama")
-    if lama is None or not len(lama):
-        other = next((f"; its {name} is of {what}" for name, what in OTHER_EIGENVALUES if name in blocks["names"]), "")
+    if lama is not None and not len(lama):
+        lama = None
+    other = next((f"; its {name} is of {what}" for name, what in OTHER_EIGENVALUES if name in blocks["names"]), "")
+    if lama is None and other:
         raise FlexibleError(
             f"{file.name}: it has no table of eigenvalues (LAMA){other}; run SOL 103 with PARAM,POST,-1"
         )
-    shapes = _shapes(file, table, len(lama))
-    if masses is None:
-        if "mgg" not in blocks:
-            raise FlexibleError(
-                f"{file.name}: modes without masses of the grid points make no body; export MGG (OUTPUT2), "
-                "or give masses"
-            )
+    factor, elements = 1.0, masses is None and "mgg" not in blocks
+    if elements:
+        masses, inertias, factor = element_masses(file, table)
+    elif masses is None:
         masses = table.in_basic(blocks["mgg"])
     lumped, turning = _nodal_masses(masses, inertias, table, file)
+    heavy = np.flatnonzero((lumped > 0.0) | turning.any(axis=(1, 2)))
+    needed = np.arange(len(table.ids)) if np.ndim(masses) == 2 or sp.issparse(masses) else heavy
+    shapes, eigenvalues, moved = _shapes(file, table, None if lama is None else len(lama), needed)
+    if lama is None:
+        lama = _table_of(eigenvalues, shapes, lumped, turning)
     weight = blocks.get("ogpwg")
-    printed = None if not weight else float(weight["m66"][0, 0])
+    printed = None if not weight else factor * float(weight["m66"][0, 0])
     if printed is not None and abs(lumped.sum() - printed) > SAME_MASS * printed:
         raise FlexibleError(
             f"{file.name}: the masses sum to {lumped.sum():.6g}, its grid point weight generator says {printed:.6g}; "
             "they belong to other nodes or units"
         )
     _check_orthogonal(file, lama[:, 5], _gram(shapes, masses, lumped, turning, table))
-    found = _as_mnf(table, lama, shapes, lumped, turning, (length, mass_unit))
+    if elements:
+        _check_elements(file, lama, shapes, lumped, turning)
+    kept = np.flatnonzero(moved)
+    left = GridTable(table.ids[kept], table.positions[kept], table.axes[kept], table.dofs)
+    found = _as_mnf(left, lama, shapes[:, kept], lumped[kept], turning[kept], (length, mass_unit))
     if not stresses:
         return found
     own = grid_stresses(file, table, length, mass_unit * length)
@@ -269,8 +285,7 @@ def _gram(shapes: np.ndarray, masses: Any, lumped: np.ndarray, turning: np.ndarr
         row = {int(number): k for k, number in enumerate(table.ids)}
         vectors = np.array([shapes[:, row[int(n)], d - 1] if n != 0 else np.zeros(len(shapes)) for n, d in table.dofs])
         return vectors.T @ (masses @ vectors)
-    moved, turned = shapes[0, :, :3], shapes[0, :, 3:]
-    return np.array([[lumped @ (moved**2).sum(axis=1) + np.einsum("pi,pij,pj->", turned, turning, turned)]])
+    return _generalised(shapes[:1], lumped, turning)[:, None]
 
 
 def _check_orthogonal(file: Path, general: np.ndarray, gram: np.ndarray) -> None:
@@ -288,6 +303,32 @@ def _check_orthogonal(file: Path, general: np.ndarray, gram: np.ndarray) -> None
             f"{file.name}: {what} {general[i] if i == j else 0.0:.6g} in the file and {gram[i, j]:.6g} with these "
             "masses; they belong to other nodes, another order or other units"
         )
+
+
+def _check_elements(file: Path, lama: np.ndarray, shapes: np.ndarray, masses: np.ndarray, inertias: np.ndarray) -> None:
+    """Refuse masses of elements that are not those of the modes, as of one superelement of several."""
+    first = np.flatnonzero(lama[:, 2] > 0.0)[:SLOWEST]
+    share = _generalised(shapes[first], masses, inertias) / np.maximum(lama[first, 5], 1e-300)
+    if share.size and not 1.0 / LUMPED < share.min() <= share.max() < LUMPED:
+        far = first[int(np.argmax(np.abs(np.log(np.maximum(share, 1e-300)))))]
+        raise FlexibleError(
+            f"{file.name}: mode {far + 1} has the generalised mass {lama[far, 5]:.6g} in the file and "
+            f"{share[list(first).index(far)] * lama[far, 5]:.6g} with the masses of its elements; some of what moves "
+            "is not in this file, as another superelement: give masses"
+        )
+    below = -float(lama[:, 2].min(initial=0.0))
+    elastic = lama[lama[:, 2] > below, 2]
+    if below > RESTING and elastic.size and below > ORTHOGONAL * elastic.min():
+        raise FlexibleError(
+            f"{file.name}: mode {int(np.argmin(lama[:, 2])) + 1} has the eigenvalue {-below:.4g}: what is not "
+            "stable is no body; mend its materials"
+        )
+
+
+def _generalised(shapes: np.ndarray, masses: np.ndarray, inertias: np.ndarray) -> np.ndarray:
+    """Return the generalised masses of shapes in masses of the nodes, (n,)."""
+    moved, turned = shapes[..., :3], shapes[..., 3:]
+    return np.einsum("npi,p,npi->n", moved, masses, moved) + np.einsum("npi,pij,npj->n", turned, inertias, turned)
 
 
 def _as_mnf(
@@ -341,23 +382,69 @@ def _nodal_masses(masses: Any, inertias: Any, table: GridTable, file: Path) -> t
     return lumped, turning
 
 
-def _shapes(file: Path, table: GridTable, count: int) -> np.ndarray:
-    """Return the shapes of an op2 file in basic coordinates, shape (n, N, 6)."""
+def _table_of(eigenvalues: np.ndarray, shapes: np.ndarray, masses: np.ndarray, inertias: np.ndarray) -> np.ndarray:
+    """Return the rows of a table of eigenvalues that a file has not, with the generalised masses of its shapes."""
+    numbers, w = np.arange(1.0, len(eigenvalues) + 1), np.sqrt(np.maximum(eigenvalues, 0.0))
+    general = _generalised(shapes, masses, inertias)
+    return np.column_stack([numbers, numbers, eigenvalues, w, w / (2.0 * np.pi), general, general * eigenvalues])
+
+
+def _mode_blocks(opened: Any, integer: str, row: dict[int, int]) -> list[tuple[str, list[bytes]]]:
+    """Return name and records of the blocks of real modes; if there are none, of the first block of displacements.
+
+    Of several, as of superelements, those that name all grid points and no others.
+    """
+    there = [
+        (name, block_records(opened, name, k))
+        for name in (*MODES, *BASIC_MODES)
+        if name in opened.dbnames
+        for k in range(len(opened.dbnames[name]))
+    ]
+    size = int(integer[-1])
+    real = [
+        (name, records)
+        for name, records in there
+        if records and len(records[0]) == IDENTIFICATION * size
+        and np.frombuffer(records[0], integer)[0] // 10 == REAL_MODES
+    ]  # fmt: skip
+    if len(real) < 2:
+        return real or there[:1]
+
+    def points(records: list[bytes]) -> set[int]:
+        words = np.frombuffer(records[1] if len(records) > 1 else b"", integer)
+        words = words[: len(words) // 8 * 8].reshape(-1, 8)
+        return {int(one[0]) // 10 for one in words if one[1] == GRID_POINT}
+
+    return [one for one in real if points(one[1]) == row.keys()] or real
+
+
+def _shapes(
+    file: Path, table: GridTable, count: int | None, needed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the shapes of an op2 file in basic coordinates, shape (n, N, 6), their eigenvalues, and which points move.
+
+    ``count`` is the number of eigenvalues of LAMA; without it as many shapes are taken as there are. ``needed`` are the
+    rows of grid points that have to be there: those with a mass.
+    """
     op2 = pyyeti_module("op2", "op2")
     with op2.OP2(str(file)) as opened:
-        name = next((name for name in (*MODES, *BASIC_MODES) if name in opened.dbnames), None)
-        if name is None:
-            raise FlexibleError(
-                f"{file.name}: it has no real mode shapes ({', '.join(MODES)}); ask for DISPLACEMENT(PLOT)=ALL"
-            )
-        if len(opened.dbnames[name]) > 1:
-            raise FlexibleError(f"{file.name}: {name} is there more than once; write one subcase")
-        records, (integer, real) = block_records(opened, name), word_kinds(opened)
-    row = {int(number): k for k, number in enumerate(table.ids)}
-    out = np.zeros((count, len(table.ids), 6))
+        integer, real = word_kinds(opened)
+        row = {int(number): k for k, number in enumerate(table.ids)}
+        found = _mode_blocks(opened, integer, row)
+    if not found:
+        raise FlexibleError(
+            f"{file.name}: it has no real mode shapes ({', '.join(MODES)}); ask for DISPLACEMENT(PLOT)=ALL"
+        )
+    name, records = found[0]
+    if len(found) > 1:
+        raise FlexibleError(f"{file.name}: {name} is there more than once; write one subcase")
+    told = count is not None
+    count = len(records) // 2 if count is None else count
+    out, eigenvalues = np.zeros((count, len(table.ids), 6)), np.zeros(count)
     if len(records) % 2 or any(len(head) != IDENTIFICATION * int(integer[-1]) for head in records[::2]):
         raise FlexibleError(f"{file.name}: {name} has no identification before each of its records")
     modes: list[int] = []
+    moved = np.ones(len(table.ids), dtype=bool)
     kind = np.dtype([("grid", integer, (2,)), ("value", real, (6,))])
     for head, data in zip(records[::2], records[1::2]):
         approach, mode, form, width = (int(k) for k in np.frombuffer(head, integer)[[0, 4, 8, 9]])
@@ -367,6 +454,9 @@ def _shapes(file: Path, table: GridTable, count: int) -> np.ndarray:
                 f"{file.name}: {name} holds {what} in {width} words a point and no real modes; run SOL 103 with "
                 "DISPLACEMENT(PLOT,SORT1,REAL)=ALL"
             )
+        eigenvalue = float(np.frombuffer(head, real)[EIGENVALUE])
+        if not told and not np.isfinite(eigenvalue):
+            raise FlexibleError(f"{file.name}: {name} has no eigenvalue of mode {mode}, and LAMA is missing; write it")
         if len(data) % kind.itemsize:
             raise FlexibleError(f"{file.name}: {name}: {len(data)} bytes are no points of 8 words")
         if len(modes) == count or mode in modes:
@@ -379,11 +469,15 @@ def _shapes(file: Path, table: GridTable, count: int) -> np.ndarray:
             raise FlexibleError(
                 f"{file.name}: {name} names grid point {numbers[places.index(-1)]}, which GEOM1 does not have"
             )
-        absent = np.setdiff1d(np.arange(len(table.ids)), places)
-        if absent.size or len(places) > len(table.ids):
-            which = f"no shapes of grid point {table.ids[absent[0]]}" if absent.size else "grid points twice"
-            raise FlexibleError(f"{file.name}: {name} has {which}; ask for all points")
-        out[len(modes), places] = points["value"]
+        if len(places) > len(set(places)):
+            raise FlexibleError(f"{file.name}: {name} has grid points twice; ask for all points")
+        absent = np.setdiff1d(needed, places)
+        if absent.size:
+            raise FlexibleError(
+                f"{file.name}: {name} has no shapes of grid point {table.ids[absent[0]]}; ask for all points"
+            )
+        moved[np.setdiff1d(np.arange(len(table.ids)), places)] = False
+        out[len(modes), places], eigenvalues[len(modes)] = points["value"], eigenvalue
         modes.append(mode)
     if not modes:
         raise FlexibleError(f"{file.name}: {name} is empty; ask for DISPLACEMENT(PLOT)=ALL in SOL 103")
@@ -394,4 +488,4 @@ def _shapes(file: Path, table: GridTable, count: int) -> np.ndarray:
     if name in MODES:
         for base in (0, 3):
             out[:, :, base : base + 3] = np.einsum("pij,npj->npi", table.axes, out[:, :, base : base + 3])
-    return out
+    return out, eigenvalues, moved

@@ -78,14 +78,24 @@ class Op2Writer:
             if name not in without:
                 self.table(name, records)
 
-    def modes(self, ids, shapes, eigenvalues, general):
-        """LAMA and OUGV1 of shapes (n, N, 6)."""
-        w = np.sqrt(eigenvalues)
+    def entries(self, name, entries):
+        """A block of the input: by key of two words the rows of an entry, numbers as float and others as int."""
+        records = [
+            self.ints(*key, 1)
+            + b"".join(self.floats([x]) if isinstance(x, float) else self.ints(x) for row in rows for x in row)
+            for key, rows in entries.items()
+        ]
+        self.table(name, [*records, self.ints(65535, 65535, 65535)])
+
+    def modes(self, ids, shapes, eigenvalues, general, listed=True, block="OUGV1"):
+        """LAMA, if listed, and OUGV1 of shapes (n, N, 6)."""
+        w = np.sqrt(np.maximum(eigenvalues, 0.0))
         rows = b"".join(
             self.ints(k + 1, k + 1) + self.floats([v, w[k], w[k] / (2 * np.pi), g, g * v])
             for k, (v, g) in enumerate(zip(eigenvalues, general))
         )
-        self.table("LAMA", [self.ints(*[0] * 146), rows])
+        if listed:
+            self.table("LAMA", [self.ints(*[0] * 146), rows])
         records = []
         for k, shape in enumerate(shapes):
             head = np.zeros(146, self.order + "i4")
@@ -95,7 +105,7 @@ class Op2Writer:
             real[5] = eigenvalues[k]
             records.append(head.tobytes())
             records.append(b"".join(self.ints(10 * i + 1, 1) + self.floats(x) for i, x in zip(ids, shape)))
-        self.table("OUGV1", records)
+        self.table(block, records)
 
     def stresses(self, elements, values, kind=67, name="OES1X1", system=0, **head):
         """OES1X1 of solids: rows of number and corners, stresses (n, elements, corners, 6) xx yy zz xy yz zx."""

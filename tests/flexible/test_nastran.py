@@ -227,7 +227,7 @@ def test_modes_and_masses_must_fit(tmp_path, bar):
         read_op2_modes(without, own.nodal_masses[:3])
     with pytest.raises(FlexibleError, match=says("4", "ask for all")):
         read_op2_modes(modes_file(tmp_path / "b.op2", bar, model, drop=3))
-    with pytest.raises(FlexibleError, match=r"no table of eigenvalues \(LAMA\)"):
+    with pytest.raises(FlexibleError, match=says("no real mode shapes", "OUGV1")):
         read_op2_modes(g_set_file(tmp_path / "c.op2", bar))
     with pytest.raises(FlexibleError, match=says("weight", "generator says")):
         read_op2_modes(modes_file(tmp_path / "d.op2", bar, model, weight=1e-3 * model.properties.mass))
