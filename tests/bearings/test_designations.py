@@ -133,10 +133,61 @@ def test_named_bearings(row):
     assert rating_life(bearing, 0.1 * bearing.rating) == pytest.approx(1e6 * 10.0 ** (10 / 3 if bearing.rollers else 3))
 
 
+NEWER = {"61808", "QJ 210 MA", "NU 205 ECP", "30205", "30208", "32008 X", "32210", "33208", "33010", "33110", "32012 X"}
+"""Of which the maker named prints another C since 2008, and `NAMED` has that: up to a quarter more."""
+
+
+def test_a_maker_that_is_named_has_its_own_ratings():
+    """Of 43 of them C of the catalogue of 2008 is within 3 % of a newer one of the same maker, but for those known."""
+    met = 0
+    for name, _, _, _, other in ROWS:
+        plain, own = by_name(name), by_name(f"SKF {name}")
+        assert (own.bore, own.outside_diameter, own.width) == (plain.bore, plain.outside_diameter, plain.width)
+        if own.rating_source == "SKF 2008":
+            met += other != "-"
+            newer = 1e3 * float(other) if other != "-" else own.rating
+            assert own.rating == pytest.approx(newer, rel=0.26 if name in NEWER else 0.03), name
+        elif own.rating_source:
+            assert own.rating == plain.rating
+    assert met == 43
+    with pytest.warns(UserWarning, match=says("URB", "SKF", "not tabulated")):
+        Bearing.from_designation("SKF 6326", estimate=True)
+
+
+PRINTED = {
+    "deep groove": (240, 0.84), "self-aligning ball": (80, 0.9), "angular contact": (50, 0.95), "four point": (24, 1.0),
+    "double row angular contact": (34, 0.95), "double row deep groove": (30, 0.95), "cylindrical roller": (236, 1.0),
+    "double row cylindrical roller": (38, 1.0), "tapered roller": (196, 1.0), "spherical roller": (120, 1.0),
+    "needle roller": (104, 1.0), "thrust ball": (103, 0.98), "thrust cylindrical roller": (48, 1.0),
+}  # fmt: skip
+"""By kind how many sizes have a printed C, and the share of which that of estimated elements is within 3 %."""
+
+
+@pytest.mark.slow
+def test_estimated_elements_have_the_printed_rating():
+    """C of ISO 281 of the elements that are estimated is the printed one, but of deep grooves at thin sections."""
+    found: dict[str, list[float]] = {}
+    for (series, code), size in sizes().items():
+        letter = series[-1] if series in ("72A", "72B", "73A", "73B") else ""
+        bearing = by_name(f"{series.removesuffix(letter)}{code} {letter}".strip())
+        assert (bearing.bore, bearing.outside_diameter) == (size.bore, size.outside_diameter)
+        if size.dynamic_rating is not None:
+            assert bearing.rating == size.dynamic_rating
+            found.setdefault(bearing.kind, []).append(dynamic_rating(bearing) / size.dynamic_rating)
+    for kind, (count, share) in PRINTED.items():
+        assert len(found[kind]) >= count
+        assert sum(abs(ratio - 1.0) < 0.03 for ratio in found[kind]) >= share * len(found[kind]), kind
+
+
+@pytest.mark.parametrize("name", ["618/8", "619/6-2Z", "618/5"])
+def test_small_bores_of_thin_sections_stand_behind_a_stroke(name):
+    assert by_name(name).bore == pytest.approx(1e-3 * int(name[4]))
+
+
 @pytest.mark.parametrize(
     ("text", "plain"),
     [
-        ("SKF 22210 EK", "22210"),
+        ("NSK 22210 EK", "22210"),
         ("23024 CC/W33", "23024"),
         ("2206 E-2RS1TN9", "2206"),
         ("3206 ATN9", "3206 A"),

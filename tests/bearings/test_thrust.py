@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -141,6 +142,33 @@ def test_a_helical_pinion_leans_on_the_one_in_its_way(sense):
     axial = [abs(rest.bearings[name][2]) for name in ("t0", "t1")]
     assert math.isclose(max(axial), expected, rel_tol=0.01)
     assert min(axial) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("52208", ("two", "'51208'", "sense=1 and sense=-1")),
+        ("54310", ("'51310'", "sense=-1")),
+        ("53208 U", ("51208",)),
+    ],
+)
+def test_those_of_two_directions_are_two(name, told):
+    with pytest.raises(BearingError, match=says(*told)):
+        Bearing.from_designation(name, estimate=True)
+
+
+@pytest.mark.filterwarnings("ignore:designation")
+@pytest.mark.parametrize("sense", [1, -1])
+def test_two_of_one_at_one_station_hold_both_ways(sense):
+    """As the message says: of the two that stand for 52206 the one in the way carries the pinion's thrust."""
+    one = seated(*rollers(), sense=sense)
+    made = one.with_parts(*(replace(one.part(name), rolling="51206", station=0.1) for name in ("t0", "t1")))
+    rest = made.at_rest
+    assert not rest.trouble
+    wheel = made.part("z2").gear
+    axial = sorted(abs(rest.bearings[name][2]) for name in ("t0", "t1"))
+    assert axial[0] == 0.0
+    assert axial[1] == pytest.approx(80.0 / wheel.pitch_radius * math.tan(wheel.helix_angle), rel=0.01)
 
 
 @pytest.mark.filterwarnings("ignore:designation")

@@ -8,14 +8,15 @@ series that the standard gives it.
 
 Ratings are those of one maker's public catalogue (URB, 2017); of four-point, double row angular contact, full
 complement and needle roller bearings, which that has not, of DAS Lager, NKE and FBJ. Others differ by their steel and
-by the number of elements, some 5 to 15 % for the same design.
+by the number of elements, some 5 to 15 % for the same design: ``ratings.csv`` has those that hold where a maker is
+named, of SKF's General Catalogue of 2008 for bores of 25 to 60 mm.
 """
 
 from __future__ import annotations
 
 import csv
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 
@@ -28,6 +29,9 @@ SAME = {
 
 LETTERS = {"72": "B", "73": "B"}
 """Series whose rows have a letter for the contact angle; the boundary dimensions are those of all letters."""
+
+EDITIONS = {"SKF": "2008"}
+"""Of the catalogues whose ratings hold where their maker is named; later ones print up to a quarter more."""
 
 CAGE = re.compile(r"(\d+)X(\d+)X(\d+)$")
 """Code of a needle roller and cage assembly K: the raceways F and E and the width, mm."""
@@ -90,7 +94,17 @@ def sizes() -> dict[tuple[str, str], Size]:
     return found
 
 
-def size_of(series: str, code: str) -> Size | None:
+@cache
+def maker_ratings() -> dict[tuple[str, str, str], tuple[float, float]]:
+    """Return C and C_0 by maker, series and code of the bore, N."""
+    text = files("gearmbs.bearings.designations").joinpath("ratings.csv").read_text(encoding="utf-8")
+    return {
+        (row["maker"], row["series"], row["code"]): (float(f"{row['C']}e3"), float(f"{row['C0']}e3"))
+        for row in csv.DictReader(text.splitlines())
+    }
+
+
+def size_of(series: str, code: str, maker: str = "") -> Size | None:
     """Return a size of a series, of its own row or only with the dimensions of another series that has them.
 
     Parameters
@@ -99,7 +113,16 @@ def size_of(series: str, code: str) -> Size | None:
         One of the table, such as "62", "NU2", "303"; RNA for NA without its inner ring, K for cages by their code.
     code : str
         Of the bore, as it stands in a designation: "05" for 25 mm, "/22" for 22 mm, "8" below 10 mm.
+    maker : str
+        Whose ratings take the place of those of the row, where they are tabulated.
     """
+    size, rated = _size_of(series, code), maker_ratings().get((maker, series, code))
+    if size is None or rated is None:
+        return size
+    return replace(size, dynamic_rating=rated[0], static_rating=rated[1], maker=f"{maker} {EDITIONS[maker]}")
+
+
+def _size_of(series: str, code: str) -> Size | None:
     if series == "K":
         cage = CAGE.match(code)
         inner, outer, width = (0.0, 0.0, 0.0) if cage is None else (1e-3 * float(part) for part in cage.groups())

@@ -30,7 +30,7 @@ def series_of(designation: str) -> tuple[str, str, str] | None:
 INCH = 25.4e-3
 """Metres."""
 
-DEEP_GROOVE = re.compile(r"^(618|619|160|161|622|623|60|62|63|64)(\d\d(?!\d)|/\d\d)|^(6[0-3])(\d)(?!\d)")
+DEEP_GROOVE = re.compile(r"^(618|619|160|161|622|623|60|62|63|64)(\d\d(?!\d)|/\d{1,2}(?!\d))|^(6[0-3])(\d)(?!\d)")
 """Designations of deep groove bearings: series, and code of the bore; below 10 mm the bore itself."""
 
 ELEMENTS = {
@@ -86,7 +86,7 @@ three and four; Q before those of tapered ones."""
 STANDING = {"DB": "a pair back to back", "DF": "a pair face to face", "DT": "a pair in tandem", "DR": "a pair"}
 REINFORCED = re.compile(r"^6\d{2,4}(?:/\d\d)?[^A-Z]*E(?:TN9|TVP\d?)?(?![A-Z])|^7\d{3}[^A-Z]*[ABC]{1,2}E")
 """Deep groove and angular contact bearings with larger balls or more of them than those of the basic design."""
-MAKERS = re.compile(r"^(?:SKF|FAG|NSK|NTN|INA|KOYO|TIMKEN|NACHI|NKE|ZVL|ZKL|KINEX|SNR|URB|RHP)\s*")
+MAKERS = re.compile(r"^(SKF|FAG|NSK|NTN|INA|KOYO|TIMKEN|NACHI|NKE|ZVL|ZKL|KINEX|SNR|URB|RHP)\s*")
 
 
 def known() -> list[str]:
@@ -114,7 +114,9 @@ def look_up(
     bare = re.sub(r"[^A-Z0-9]", "", designation.upper())
     if bare in ALIASES:
         return {**RECORDINGS[ALIASES[bare]], **changes}
-    bare = MAKERS.sub("", designation.upper().strip())
+    bare = designation.upper().strip()
+    named_maker = MAKERS.match(bare)
+    maker, bare = ("", bare) if named_maker is None else (named_maker[1], bare[named_maker.end() :])
     bare = re.sub(r"^([A-Z]+(?:18(?=\s+\d))?)\s+(?=\d)", r"\1", re.sub(r"^SL\s+18", "SL18", bare))
     _check_single(designation, bare)
     if rating is not None and "dynamic_rating" not in changes and REINFORCED.search(bare):
@@ -131,15 +133,18 @@ def look_up(
                 f"designation {designation!r}: {other[1]} behind its size names another bore or raceway, which is not "
                 "tabulated; leave it away and give bore="
             )
-        size = size_of(*group[:2])
+        size = size_of(*group[:2], maker)
         fixed = known_of(bare, {} if size is None else size.boundary)
         if fixed is not None:
-            rated = size_of(fixed.rated, group[1]) if fixed.rated else size
+            rated = size_of(fixed.rated, group[1], maker) if fixed.rated else size
             named = named_class(designation, group[2], changes)
             return _asked(designation, fixed, changes, named, group[2], rating, rated)
     digits = DEEP_GROOVE.match(bare) or re.match(r"^(\d{4,5})", bare)
     series = digits[0] if digits else ""
-    size = size_of(*(part for part in digits.groups() if part)) if digits and digits.re is DEEP_GROOVE else None
+    size = None
+    if digits and digits.re is DEEP_GROOVE:
+        first, code = (part for part in digits.groups() if part)
+        size = size_of(first, code, maker)
     named = None
     if digits:
         suffixes = bare[digits.end() :]
@@ -148,7 +153,7 @@ def look_up(
     if series in ELEMENTS:
         z, d, pitch = ELEMENTS[series]
         found = {"elements": z, "element_diameter": 1e-3 * d, "pitch_diameter": 1e-3 * pitch}
-        known_size = size if size is not None else size_of(series[:2], series[2:])
+        known_size = size if size is not None else size_of(series[:2], series[2:], maker)
         assert known_size is not None
         own = {**known_size.boundary, **_clearance(named, known_size), "designation": designation.strip()}
         return {**found, **own, **(known_size.ratings if rating is not None else {}), **changes}
@@ -331,8 +336,10 @@ def _estimated(
         told += f" of {1e3 * found['element_diameter']:.4g} mm"
     rated = "its C is estimated from them, too"
     if "dynamic_rating" in own:
-        maker = own.get("rating_source")
+        maker, meant = own.get("rating_source"), MAKERS.match(designation.upper().strip())
         rated = f"its C is that of a maker's catalogue ({maker})" if maker else "its C is the one given"
+        if maker and meant and not maker.startswith(meant[1]):
+            rated += f", as that of {meant[1]} is not tabulated"
     warn(
         f"designation {designation!r}: {told} are estimated, for makers do not publish them: one element more or less "
         f"moves the lines of its races by {100.0 / count:.2g} %, and its radial "

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import re
 
-NOT_THERE = (
-    (r"5[2-4][1-4]\d\d(?!\d)", "a thrust ball bearing of two directions or with a spherical washer"),
-    (r"89[34]\d\d(?!\d)", "a cylindrical roller thrust bearing"),
-    (r"29[2-4]\d\d(?!\d)", "a spherical roller thrust bearing"),
-)
+NOT_THERE = ((r"29[2-4]\d\d(?!\d)", "a spherical roller thrust bearing"),)
 """Designations of thrust bearings, of which there is no kind."""
+BALLS = re.compile(r"5(?P<form>[2-4])(?P<section>[1-4]\d\d)(?!\d)")
+"""Thrust ball bearings with the balls of those that begin with 51: 52 of two directions, 53 and 54 on a sphere."""
 NOT_TABULATED = (
+    (
+        r"89[34]\d\d(?!\d)",
+        "a cylindrical roller thrust bearing of a series that is not tabulated",
+        "give kind= of thrust rollers with bore=, outside_diameter=, width=, dynamic_rating= and "
+        "static_rating= of the catalogue, and elements=, element_diameter=, roller_length= and pitch_diameter=",
+    ),
     (
         r"C\d{4}(?!\d)",
         "a toroidal roller bearing, which gives way along its axis",
@@ -32,6 +36,15 @@ NOT_TABULATED = (
 
 def told_of(designation: str) -> str:
     """Return what is said of a designation of no kind, in capitals; empty if nothing is known of it."""
+    balls = BALLS.match(designation)
+    if balls is not None:
+        one = f"51{balls['section']}"
+        if balls["form"] == "3":
+            return f"is a thrust ball bearing whose washer stands on a sphere; its balls and C are those of '{one}'"
+        return (
+            "is a thrust ball bearing of two directions, which carries in each what one of one does: give two of "
+            f"'{one}' at its station, with sense=1 and sense=-1"
+        )
     for pattern, name in NOT_THERE:
         if re.match(pattern, designation):
             return (
