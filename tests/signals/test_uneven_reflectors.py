@@ -64,3 +64,24 @@ def test_a_reflector_that_is_weak_in_each_third_turn_is_told(places):
     whole, _ = counted(tacho(places, COURSES["even"]), 2)
     turns, said = counted(tacho(places, COURSES["even"], lost=np.arange(2, 118, 6)), 2)
     assert abs(turns - whole) < 0.01 or any("CHECK THE COUNT" in one for one in said)
+
+
+@pytest.mark.parametrize("course", COURSES)
+@pytest.mark.parametrize("places", [(0.0, 0.5), (0.0, 0.45), PLACES[2], PLACES[3]])
+@pytest.mark.parametrize("fault", ["lost", "doubled"])
+def test_a_mark_that_is_lost_or_doubled_from_some_turn_on_is_told(fault, places, course):
+    """Of two even marks all intervals are alike again behind it: turns had been halved in silence."""
+    lines, angle = len(places), COURSES[course]
+    whole, _ = counted(tacho(places, angle), lines)
+    for mark in range(lines):
+        gone = np.arange(lines * 20 + mark, lines * (angle[-1] + 1), lines)
+        turns, said = counted(tacho(places, angle, **{fault: gone}), lines)
+        assert abs(turns - whole) < 0.01 or any("CHECK THE COUNT" in one for one in said), (mark, turns - whole, said)
+
+
+@pytest.mark.parametrize("lines", [1, 2])
+def test_a_speed_that_changes_within_some_turns_is_no_lost_mark(lines):
+    """From 900 to 1500 rpm within four turns, steady before and behind."""
+    turns = np.cumsum(np.interp(TIME, [0.0, 2.0, 2.2, 4.0], [15.0, 15.0, 25.0, 25.0])) / RATE
+    _, said = counted(tacho((0.0, 0.5)[:lines], turns), lines)
+    assert not said

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from gearmbs.signals.encoders.turns import counted_turns, turns_between
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.rotation.phase import PulseFault, described, mended_count, pulse_edges, pulse_faults
-from gearmbs.signals.rotation.recurring import doubtful_turns
+from gearmbs.signals.rotation.recurring import doubtful_turns, sudden_jump
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 
 TURN = 2.0 * math.pi
@@ -266,6 +266,8 @@ def _doubts(train: PulseTrain, found: list[PulseFault]) -> list[str]:
     what += ["an interval near an end is unlike those of its mark"] * bool(at_ends)
     what += [f"{mended} pulses of {train.numbers.size} were mended by the intervals beside them alone"] * many
     what += [f"pulses between others at {tangled} places fit no mark"] * (tangled > 0 and not lacking.any())
+    jump = sudden_jump(train.numbers, train.times, train.lines)
+    what += [] if jump is None else [str(jump)]
     if not what:
         return []
     return [

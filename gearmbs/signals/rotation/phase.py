@@ -16,7 +16,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
-from gearmbs.signals.rotation.recurring import doubtful_turns
+from gearmbs.signals.rotation.recurring import doubtful_turns, sudden_jump
 from gearmbs.signals.rotation.uneven_marks import uneven_faults
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.given import speed_curve
@@ -164,6 +164,11 @@ def phase_from_tacho(
                 "marks in other turns, so that turns and speed may be wrong; raise the level of weak marks "
                 "(threshold=...), or use one mark a turn."
             )
+    if faults != "keep" and (jump := sudden_jump(numbers, edges[kept_edges], max(1, round(pulses_per_rev)))):
+        notes.append(
+            f"Tacho {name!r}: CHECK THE COUNT: {jump}. The speed is that of the pulses as they come; raise the level of "
+            "weak marks (threshold=...), or take the time before or behind alone."
+        )
     for note in notes:
         warn(note, UserWarning)
     edges, angles = edges[kept_edges], 2.0 * np.pi / pulses_per_rev * numbers

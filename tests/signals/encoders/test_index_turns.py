@@ -158,3 +158,22 @@ def test_half_orders_bend_nothing_beyond_the_last_index_pulse(lines):
     index = np.interp(2 * np.pi * np.arange(1, TURNS - 1) - np.pi / lines, angle, clock)
     train = pulse_train(times, lines, index=index)
     np.testing.assert_array_equal(train.numbers - train.numbers[0], n - n[0])
+
+
+@pytest.mark.parametrize(("lines", "every"), [(2, 2), (4, 2), (4, 4), (60, 2), (3, 3)])
+def test_marks_lost_from_some_turn_on(lines, every):
+    """Of two even marks all intervals are alike again, twice as long: the jump tells, or index pulses count."""
+    times, n, errors, index = record(lines)
+    seen = times[(n < 20 * lines) | (n % every != 1)]
+    assert re.search(says("CHECK THE COUNT", "index"), told(seen, lines))
+    if lines // every == 1:
+        train = pulse_train(seen, lines, index=index)
+        assert train.turns == np.ptp(n[np.isin(times, seen)]) / lines
+        assert abs(instantaneous_speed(angle_of_pulses(train, errors)) - SPEED).max() < 1e-4 * SPEED
+
+
+def test_a_mark_doubled_from_some_turn_on():
+    """One mark a turn, twice its pulses."""
+    times = record(1)[0]
+    seen = np.sort(np.append(times, times[20:-1] + 0.5 * np.diff(times[20:])))
+    assert re.search(says("CHECK THE COUNT", "index"), told(seen, 1))
