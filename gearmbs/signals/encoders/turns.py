@@ -38,8 +38,16 @@ MOST_LOST, MOST_EXTRA = 8, 3
 """Marks without pulses, and pulses without marks, in a row."""
 MARGIN = 4.0
 """By how much another path must cost more for a pulse to be surely of its mark: e^4 times less likely."""
+LEAST_OF_STEPS = 0.8
+"""Part of the marks of a turn that must have pulses for steps to be counted by those around them."""
+STEPS_AROUND = 8
+"""Steps on each side whose median is the pitch there."""
+SURE_STEP = 0.45
+"""How far from a whole number of pitches a step may be to be counted: marks off by a fifth of one make 0.4."""
 BAND = 16
 """Marks by which a path may stray from the straight one beyond what the counts of a turn differ by."""
+OPEN = 2
+"""Pulses in which one may be missing throughout where no index pulse ends a part, beyond the band."""
 OVERLAP = 3
 """Pulses that fit, beside those that do not, that are laid anew with them."""
 NOWHERE = -(2**40)
@@ -94,23 +102,16 @@ def counted_turns(edges: np.ndarray, lines: int, index: np.ndarray) -> Counted |
     place[late] = turns.sum() + (edges[late] - once[-1]) * turns[-1] / (once[-1] - once[-2])
     if np.any(np.diff(place) <= 0.0):
         return None
-    whole = np.flatnonzero((np.diff(at) == lines) & (turns == 1))
     first = np.concatenate(([0], np.cumsum(turns)))
-    if whole.size < FEWEST_SOUND:
+    one = np.flatnonzero(turns == 1)
+    seen = [place[at[k] : at[k + 1]] - first[k] for k in one if at[k + 1] - at[k] == lines]
+    if len(seen) < FEWEST_SOUND:
+        # hardly a turn of many marks is whole where one in a hundred is lost
+        seen = [at_marks for k in one if (at_marks := _by_steps(place[at[k] : at[k + 1]] - first[k], lines)) is not None]
+    found = _places_of_marks(np.array(seen).reshape(-1, lines), lines)
+    if found is None:
         return None
-    # the last mark of the turn before closes the steps of a turn
-    seen = np.array([place[at[k] : at[k] + lines] - first[k] for k in whole])
-    marks = np.median(seen, axis=0)
-    steps = np.diff(marks, prepend=0.0, append=1.0)
-    if steps.min() <= 0.0:
-        return None
-    off = _off(np.diff(seen, axis=1, prepend=0.0, append=1.0), steps, lines)
-    scatter = 1.4826 * float(np.median(np.abs(off)))
-    bound = max(ALIKE, CLEAR * scatter)
-    sound = np.abs(off).max(axis=1) <= bound
-    if sound.sum() < FEWEST_SOUND:
-        return None
-    marks = np.median(seen[sound], axis=0)
+    marks, scatter, bound = found
     laid = _Laid(lines, marks, max(LEAST_SCATTER, scatter), bound)
     at_end = _Laid(lines, marks, LOOSER * laid.scatter, LOOSER * bound)
     numbers = np.full(edges.size, -1, dtype=np.int64)
@@ -138,6 +139,56 @@ def counted_turns(edges: np.ndarray, lines: int, index: np.ndarray) -> Counted |
         numbers[begin:end] = found + start
         taken[begin:end] = good
     return Counted(np.flatnonzero(taken), numbers[taken], unread)
+
+
+def _places_of_marks(seen: np.ndarray, lines: int) -> tuple[np.ndarray, float, float] | None:
+    """Return where marks stand in a turn, the scatter of steps, and what sound ones keep within; None if unknown.
+
+    Parameters
+    ----------
+    seen : ndarray of shape (turns, lines)
+        Places of the pulses of each turn; nan of those that are missing.
+    """
+    if seen.shape[0] < FEWEST_SOUND or np.isnan(seen).all(axis=0).any():
+        return None
+    marks = np.nanmedian(seen, axis=0)
+    steps = np.diff(marks, prepend=0.0, append=1.0)
+    if steps.min() <= 0.0:
+        return None
+    # the last mark of the turn before closes the steps of a turn
+    off = _off(np.diff(seen, axis=1, prepend=0.0, append=1.0), steps, lines)
+    there = np.isfinite(off)
+    scatter = 1.4826 * float(np.median(np.abs(off[there])))
+    bound = max(ALIKE, CLEAR * scatter)
+    sound = np.where(there, np.abs(off), 0.0).max(axis=1) <= bound
+    if sound.sum() < FEWEST_SOUND or np.isnan(seen[sound]).all(axis=0).any():
+        return None
+    return np.nanmedian(seen[sound], axis=0), scatter, bound
+
+
+def _by_steps(place: np.ndarray, lines: int) -> np.ndarray | None:
+    """Return where the marks of a turn passed, nan where a pulse is missing, or None if steps do not count them."""
+    numbers = _numbers_by_steps(place, lines)
+    if numbers is None or place.size < LEAST_OF_STEPS * lines or numbers[-1] >= lines:
+        return None
+    out = np.full(lines, np.nan)
+    out[numbers] = place
+    return out
+
+
+def _numbers_by_steps(place: np.ndarray, lines: int) -> np.ndarray | None:
+    """Return numbers of pulses behind an index pulse by steps that are whole numbers of those around; None if not."""
+    if place.size < 2:
+        return None
+    steps = np.diff(place)
+    parts = np.arange(0, steps.size, STEPS_AROUND)
+    medians = [float(np.median(steps[max(0, k - STEPS_AROUND) : k + STEPS_AROUND + 1])) for k in parts]
+    spaces = steps / np.interp(np.arange(steps.size), parts, medians)
+    whole = np.round(spaces)
+    if np.any(whole < 1.0) or np.abs(spaces - whole).max() > SURE_STEP:
+        return None
+    # an index pulse stands between marks, half a pitch or so before the first one
+    return max(0, round(place[0] * lines - 0.5)) + np.concatenate(([0], np.cumsum(whole.astype(int))))
 
 
 def _clear_of_marks(edges: np.ndarray, once: np.ndarray) -> np.ndarray:
@@ -178,6 +229,8 @@ class _Laid:
         ahead = self._alike(np.diff(events[:same]), np.diff(targets[:same]))
         if ahead == events.size - 1 and events.size == targets.size:
             return np.arange(place.size)
+        if (counted := self._counted(place, marks, [float(turns)])) is not None:
+            return counted
         behind = self._alike(np.diff(events[-same:])[::-1], np.diff(targets[-same:])[::-1])
         head = max(0, min(ahead, same - 2) - OVERLAP)
         tail = max(0, min(behind, same - 2 - head) - OVERLAP)
@@ -191,6 +244,15 @@ class _Laid:
         )
         return np.where(numbers == NOWHERE, NOWHERE, numbers - 1)[1:-1]
 
+    def _counted(self, place: np.ndarray, marks: np.ndarray, end: list[float]) -> np.ndarray | None:
+        """Return numbers of pulses whose steps count them, if all of these are then as those of the marks."""
+        numbers = _numbers_by_steps(place, self.lines)
+        if numbers is None or numbers[-1] >= marks.size:
+            return None
+        events, targets = np.concatenate(([0.0], place, end)), np.concatenate(([0.0], marks[numbers], end))
+        off = _off(np.diff(events), np.diff(targets), self.lines)
+        return numbers if np.abs(off).max() <= self.bound else None
+
     def behind(self, place: np.ndarray) -> np.ndarray:
         """Return numbers of pulses behind the last index pulse."""
         turns = max(1, math.ceil(float(place[-1])) + 1)
@@ -200,6 +262,8 @@ class _Laid:
         ahead = self._alike(np.diff(events[:same]), np.diff(targets[:same]))
         if ahead == events.size - 1:
             return np.arange(place.size)
+        if (counted := self._counted(place, marks, [])) is not None:
+            return counted
         head = max(0, ahead - OVERLAP)
         core = self._core(events[head:], targets[head : head + 2 * (events.size - head) + MOST_LOST], True)
         numbers = np.concatenate((np.arange(head), np.where(core == NOWHERE, NOWHERE, core + head)))
@@ -215,8 +279,13 @@ class _Laid:
         begin = np.where(np.arange(targets.size) == 0, 0.0, np.inf)
         end = np.zeros(targets.size) if open_end else begin
         # the way back is the way there of the mirrored train
-        total = self._costs(events, targets, begin, open_end)
-        total += self._costs(-events[::-1], -targets[::-1], end, open_end)[::-1, ::-1]
+        size, count = events.size, targets.size
+        straight, net = np.arange(size), count - size
+        low = straight - BAND if open_end else straight + min(0, net) - BAND
+        high = straight + straight // OPEN + BAND if open_end else straight + max(0, net) + BAND
+        low, high = np.clip(low, 0, count), np.clip(high + 1, 0, count)
+        total = self._costs(events, targets, begin, low, high)
+        total += self._costs(-events[::-1], -targets[::-1], end, count - high[::-1], count - low[::-1])[::-1, ::-1]
         best = float(total[0, 0])
         result = np.full(events.size, NOWHERE, dtype=np.int64)
         if not math.isfinite(best):
@@ -231,8 +300,13 @@ class _Laid:
             result[-1] = targets.size - 1
         return result
 
-    def _costs(self, events: np.ndarray, targets: np.ndarray, begin: np.ndarray, wide: bool) -> np.ndarray:
-        """Return the least cost of a path to each pair of event and mark, from the first event at a cost of its own."""
+    def _costs(
+        self, events: np.ndarray, targets: np.ndarray, begin: np.ndarray, lows: np.ndarray, highs: np.ndarray
+    ) -> np.ndarray:
+        """Return the least cost of a path to each pair of event and mark, from the first event at a cost of its own.
+
+        Marks of an event are looked at from `lows` to `highs` (exclusive).
+        """
         reach, count = MOST_LOST + 1, targets.size
         cost = np.full((events.size, reach + count), np.inf)
         cost[0, reach:] = begin
@@ -240,10 +314,8 @@ class _Laid:
         steps = targets[:, None] - np.lib.stride_tricks.sliding_window_view(ahead, reach)[:count]
         known = (steps + FLOOR / self.lines) * self.scatter
         passed = PRICE * np.arange(reach - 1, -1, -1)
-        net = count - events.size
         for i in range(1, events.size):
-            low = 0 if wide else max(0, i + min(0, net) - BAND)
-            high = count if wide else min(count, i + max(0, net) + BAND + 1)
+            low, high = int(lows[i]), int(highs[i])
             back = np.arange(1, min(i, MOST_EXTRA + 1) + 1)
             before = np.lib.stride_tricks.sliding_window_view(cost[i - back, low : high + reach - 1], reach, axis=1)
             off = ((events[i] - events[i - back])[:, None, None] - steps[low:high]) / known[low:high]

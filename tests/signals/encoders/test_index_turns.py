@@ -177,3 +177,17 @@ def test_a_mark_doubled_from_some_turn_on():
     times = record(1)[0]
     seen = np.sort(np.append(times, times[20:-1] + 0.5 * np.diff(times[20:])))
     assert re.search(says("CHECK THE COUNT", "index"), told(seen, 1))
+
+
+@pytest.mark.parametrize(("amount", "share"), [(0.01, 0.001), (0.01, 0.05), (0.2, 0.01)])
+def test_many_lines_of_which_no_turn_is_whole(amount, share):
+    """1024 lines: of each turn some are lost; the steps count them, turns beside each other give the marks."""
+    times, n, errors, index = record(1024, uneven(1024, amount), turns=12, swing=2e-4)
+    index = np.interp(1024 * np.arange(1, 11) - 0.5, n, times)
+    seen = times[np.random.default_rng(2).random(times.size) > share]
+    train = pulse_train(seen, 1024, index=index)
+    np.testing.assert_array_equal(train.times, seen)
+    off = train.numbers - n[np.searchsorted(times, seen)]
+    assert np.all(off == off[0])
+    assert off[0] % 1024 == 0
+    assert re.search(says("missing", "Mended"), " ".join(train.notes))
