@@ -13,12 +13,13 @@ import pandas as pd
 from scipy import stats
 
 from gearmbs._display import Shown
-from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.encoders.cycle import fall, missing_beyond, noise_within
 from gearmbs.signals.encoders.estimate import Found, amplitude_interval
 from gearmbs.signals.encoders.lengths import ACCURACY
 from gearmbs.signals.encoders.orders import Gearing, beside
 from gearmbs.signals.encoders.pulses import TURN
+from gearmbs.signals.encoders.report import SHAFTS, markdown_of, verdict_of
+from gearmbs.signals.encoders.unseen import unseen, unseen_mesh
 from gearmbs.signals.errors import SignalError
 from gearmbs.units import Quantity, to_si
 
@@ -39,9 +40,6 @@ LEAST_REST = 1e-6
 ENDS = 8
 """Turns of the slower shaft that a record must have beside those of the window: two at either end for the smooth angle,
 four for its flank."""
-LISTED = 4
-"""Harmonics whose lengths a report names."""
-SHAFTS = ("driver", "driven")
 
 
 class OrderLine(NamedTuple):
@@ -192,7 +190,7 @@ class MeasuredTransmissionError(Shown):
         rows = []
         intervals = self.harmonics(load)
         for one, seen in zip((o for o in self.lines if o.harmonic), intervals["low"] > 0.0, strict=True):
-            value, variance = self._value(one, load)
+            value, variance = self.of_load(one, load)
             size = abs(value)
             half = float(stats.t.ppf(0.5 + 0.5 * self.probability, one.freedom)) * math.sqrt(variance)
             reach = half / size if size else math.inf
@@ -204,29 +202,8 @@ class MeasuredTransmissionError(Shown):
         columns = ["harmonic", "amplitude", "reach", "seen", "known", "times", "seconds", "free_driver", "free_driven"]
         return pd.DataFrame(rows, columns=columns)
 
-    def _lengths_in_words(self, load: str) -> str:
-        """Return which harmonics are known to what was asked, and what the others take."""
-        table = self.record_lengths(load=load)
-        known, unseen = table[table["known"]], table[~table["seen"]]
-        rest = table[table["seen"] & ~table["known"]]
-        marks, short = rest[np.isinf(rest["times"])], rest[np.isfinite(rest["times"])]
-        words = [f"Known to {100 * self.accuracy:g} %: {_listed(known['harmonic']) if len(known) else 'no harmonic'}."]
-        if len(short):
-            each = [
-                f"{r.harmonic} (to {100 * r.reach:.2g} %) takes {_rounded(r.times)} times the record, "
-                f"{_rounded(r.seconds)} s in mesh"
-                for r in short.itertuples()
-            ]
-            more = f" and {len(each) - LISTED} more, see record_lengths" if len(each) > LISTED else ""
-            free = ", and as many times the free runs" if any(self.freed.values()) else ""
-            words.append(f"Harmonic {'; '.join(each[:LISTED])}{more}{free}.")
-        if len(marks):
-            words.append(f"No length is enough for {_listed(marks['harmonic'])}: the marks are unknown.")
-        if len(unseen):
-            words.append(f"Not clear of the noise: {_listed(unseen['harmonic'])}.")
-        return " ".join(words)
-
-    def _value(self, one: OrderLine, load: str) -> tuple[complex, float]:
+    def of_load(self, one: OrderLine, load: str) -> tuple[complex, float]:
+        """Return an order's complex amplitude at a load, m, and the variance of each of its parts, m^2."""
         value, variance = one.found.of({f"T {load}": 1.0 + 0.0j})
         return self.radius * value, self.radius**2 * variance
 
@@ -255,7 +232,7 @@ class MeasuredTransmissionError(Shown):
             whole = (one.first, one.second)[shaft] if shaft is not None else int(one.order * turns)
             if whole is None or (one.harmonic and not with_mesh):
                 continue
-            value, variance = self._value(one, load)
+            value, variance = self.of_load(one, load)
             if clear and abs(value) ** 2 < bound * variance:
                 continue
             by_second = one.first is None and one.second is not None
@@ -305,7 +282,7 @@ class MeasuredTransmissionError(Shown):
         error = np.zeros(points)
         for one in self.lines:
             if one.harmonic and (harmonics is None or one.harmonic <= harmonics):
-                value = self._value(one, load)[0]
+                value = self.of_load(one, load)[0]
                 if one.first is None and one.second is not None:
                     value *= np.exp(1j * one.second * self.places[load])
                 error += np.real(value * np.exp(1j * TURN * one.harmonic * phase))
@@ -345,7 +322,7 @@ class MeasuredTransmissionError(Shown):
         if not mesh:
             raise SignalError("harmonics: none are seen, so that there is no curve over a mesh cycle")
         numbers = np.array([one.harmonic for one in mesh])
-        found = [self._value(one, load) for one in mesh]
+        found = [self.of_load(one, load) for one in mesh]
         values, variances = (np.array(part) for part in zip(*found, strict=True))
         turned = [
             np.exp(1j * one.second * self.places[load]) if one.first is None and one.second is not None else 1.0
@@ -373,16 +350,24 @@ class MeasuredTransmissionError(Shown):
         -------
         DataFrame
             ``F_i`` total range, ``f_i`` largest range within one pitch, ``f_l`` range of the long waves, orders below
-            half the mesh order, ``f_k`` range of the short waves, all others; ``within`` what they are known to.
+            half the mesh order, ``f_k`` range of the short waves, all others, nan where no mesh harmonic is seen;
+            ``within`` what F_i is known to, with what orders may add that are not seen (`encoders.unseen`).
         """
-        rows = []
+        rows, load = [], self._load(load)
+        lacking, mesh_seen = [unseen(self, load, at) for at in (0, 1)], any(one.harmonic for one in self.lines)
         for name, shaft in (("pair", None), ("driver", 0), ("driven", 1)):
-            values, turns, variance = self._closed(self._load(load), shaft)
+            values, turns, variance = self._closed(load, shaft)
             mesh = float(self.gearing.mesh if shaft != 1 else self.gearing.on_second(self.gearing.mesh))
             long, short = (beside(values, turns, 0.5 * mesh, high) for high in (False, True))
             width = max(2, round(values.size / (turns * mesh)))
             steps = np.lib.stride_tricks.sliding_window_view(np.concatenate((values, values[: width - 1])), width)
             reach = float(stats.norm.ppf(0.5 + 0.5 * self.probability)) * math.sqrt(2.0 * variance)
+            own = lacking if shaft is None else [lacking[shaft]]
+            if not mesh_seen:
+                reach += sum(part.long for part in own)
+                rows.append((name, math.nan, math.nan, np.ptp(long), math.nan, reach))
+                continue
+            reach += sum(part.whole for part in own) - 2.0 * unseen_mesh(self, load) * (len(own) - 1)
             rows.append((name, np.ptp(values), np.ptp(steps, axis=1).max(), np.ptp(long), np.ptp(short), reach))
         return pd.DataFrame(rows, columns=["of", "F_i", "f_i", "f_l", "f_k", "within"])
 
@@ -400,8 +385,8 @@ class MeasuredTransmissionError(Shown):
             ``tooth``, as the train's `tooth_at_zero` numbers them, else from the one in mesh at mark 0; ``error``, what
             the wheel's orders beside the mesh orders come to over the tooth's pitch, on average, m; ``deviation`` of it
             from the run-out of the others, m; ``within`` what these are known to, with what the teeth of the other
-            wheel may add if the record ends before the wheels meet again; ``f_i`` the range over this pitch, mesh
-            orders included, m; and whether it stands out.
+            wheel may add if the record ends before the wheels meet again, and orders that are not seen; ``f_i`` the
+            range over this pitch, mesh orders included, m; and whether it stands out.
 
         Raises
         ------
@@ -418,8 +403,9 @@ class MeasuredTransmissionError(Shown):
         for one in self.lines:
             order = (one.first, one.second)[at]
             if order is not None and not one.harmonic:
-                variance += self._value(one, load)[1] * np.sinc(order / count) ** 2
+                variance += self.of_load(one, load)[1] * np.sinc(order / count) ** 2
         within = float(stats.norm.ppf(0.5 + 0.5 * self.probability)) * math.sqrt(variance) + self._leak(load, at)
+        within += unseen(self, load, at).of_a_tooth()
         off = _beside_run_out(error)
         scale = 1.4826 * float(np.median(np.abs(off)))
         out = np.abs(off) > max(OUTSTANDING * scale, within)
@@ -470,7 +456,8 @@ class MeasuredTransmissionError(Shown):
     def tables(self) -> dict[str, pd.DataFrame]:
         """All numbers as tables.
 
-        mesh_harmonics, shaft_orders, single_flank, record_lengths and, with teeth, driver_teeth and driven_teeth.
+        mesh_harmonics, shaft_orders, single_flank, record_lengths and, with teeth, driver_teeth and driven_teeth; of
+        several loads mesh_differences from the first.
         """
         found = {
             name: pd.concat([make(load).assign(load=load) for load in self.loads], ignore_index=True)
@@ -479,6 +466,12 @@ class MeasuredTransmissionError(Shown):
                 ("single_flank", self.single_flank), ("record_lengths", lambda load: self.record_lengths(load=load)),
             )
         }  # fmt: skip
+        first = self.loads[0]
+        if len(self.loads) > 1:
+            found["mesh_differences"] = pd.concat(
+                [self.difference(load, first).assign(load=f"{load} - {first}") for load in self.loads[1:]],
+                ignore_index=True,
+            )
         for shaft in SHAFTS if self.teeth is not None else ():
             found[f"{shaft}_teeth"] = pd.concat(
                 [self.tooth_errors(shaft, load).assign(load=load) for load in self.loads], ignore_index=True
@@ -488,58 +481,11 @@ class MeasuredTransmissionError(Shown):
     @property
     def verdict(self) -> str:
         """What is sure, in a sentence."""
-        mesh = self.harmonics()
-        sure = mesh[mesh["low"] > 0.0]
-        doubt = "" if self.doubt is None else f"{self.doubt} "
-        if not len(sure):
-            return doubt + (
-                "No mesh harmonic stands clear of the marks: run the shafts free, or turn a disc, and give those runs."
-            )
-        first = sure.iloc[0]
-        open_ones = int((~mesh["calibrated"]).sum())
-        rest = (
-            f"; {open_ones} of {len(mesh)} harmonics have the interval that marks leave, which only runs that differ "
-            "take away"
-            if open_ones
-            else ""
-        )
-        return doubt + (
-            f"Mesh harmonic {int(first['harmonic'])} of the transmission error is {1e6 * first['amplitude']:.4g} um "
-            f"({1e6 * first['low']:.4g} to {1e6 * first['high']:.4g} um){rest}."
-        )
+        return verdict_of(self)
 
     def to_markdown(self) -> str:
         """The report as Markdown text, lengths in micrometres."""
-        parts = [
-            f"# Transmission error from {self.source}", "",
-            f"- Driver {self.speed * 30.0 / math.pi:.1f} rpm, ratio {self.gearing.ratio}, mesh order "
-            f"{float(self.gearing.mesh):g}; lag of the driven shaft on the driver's base circle of "
-            f"{1e3 * self.radius:.4g} mm",
-            f"- Encoders of {self.lines_of[0]} and {self.lines_of[1]} lines; intervals of {100 * self.probability:g} %",
-            *(f"- {note}" for note in self.notes), "",
-            f"**{self.verdict}**",
-        ]  # fmt: skip
-        if self.teeth is not None and self.short is not None:
-            parts += ["", self.short]
-        for load in self.loads:
-            title = f" ({load})" if len(self.loads) > 1 else ""
-            parts += ["", f"## Mesh harmonics, peak amplitudes in um{title}", "", _micro(self.harmonics(load))]
-            parts += ["", self._lengths_in_words(load)]
-            parts += ["", f"## Single-flank values, um{title}", "", _micro(self.single_flank(load))]
-            for shaft in SHAFTS if self.teeth is not None else ():
-                teeth = self.tooth_errors(shaft, load)
-                out = teeth[teeth["stands_out"]]
-                words = ", ".join(f"{t} ({1e6 * e:+.2f} um)" for t, e in zip(out["tooth"], out["deviation"]))
-                within = 1e6 * float(teeth["within"].iloc[0])
-                counted = "" if self.referenced[_shaft(shaft)] else ", counted from where the record begins"
-                parts += [
-                    "",
-                    f"Teeth of the {shaft} that stand out{title}{counted if words else ''}: {words or 'none'} "
-                    f"(known to {within:.2g} um).",
-                ]
-        if self.refused:
-            parts += ["", "## What these encoders cannot show", "", *(f"- {text}" for text in self.refused)]
-        return "\n".join(parts)
+        return markdown_of(self)
 
     def __str__(self) -> str:
         return self.to_markdown()
@@ -560,33 +506,7 @@ def _beside_run_out(error: np.ndarray) -> np.ndarray:
     return rest
 
 
-def _listed(harmonics: Iterable[int]) -> str:
-    """Return whole numbers in words, neighbours together."""
-    runs: list[list[int]] = []
-    for h in harmonics:
-        if runs and h == runs[-1][-1] + 1:
-            runs[-1].append(h)
-        else:
-            runs.append([h])
-    return ", ".join(str(r[0]) if len(r) == 1 else f"{r[0]}{' to ' if len(r) > 2 else ', '}{r[-1]}" for r in runs)
-
-
-def _rounded(value: float) -> str:
-    """Return a number with two digits, without an exponent."""
-    return f"{float(f'{value:.2g}'):g}" if value < 1e6 else f"{value:.1e}"
-
-
 def _shaft(name: str) -> int:
     if name not in SHAFTS:
         raise SignalError(f"shaft: must be 'driver' or 'driven', got {name!r}")
     return SHAFTS.index(name)
-
-
-def _micro(table: pd.DataFrame) -> str:
-    """Return a table in Markdown with lengths in micrometres."""
-    out = table.copy()
-    for column in out.columns.intersection(["amplitude", "low", "high", "F_i", "f_i", "f_l", "f_k", "within"]):
-        out[column] = [f"{1e6 * value:.4g}" for value in out[column]]
-    if "phase" in out:
-        out["phase"] = out["phase"].round(3)
-    return markdown_table(list(out.columns), out.to_numpy().tolist())

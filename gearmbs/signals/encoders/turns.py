@@ -107,11 +107,13 @@ def counted_turns(edges: np.ndarray, lines: int, index: np.ndarray) -> Counted |
     seen = [place[at[k] : at[k + 1]] - first[k] for k in one if at[k + 1] - at[k] == lines]
     if len(seen) < FEWEST_SOUND:
         # hardly a turn of many marks is whole where one in a hundred is lost
-        seen = [at_marks for k in one if (at_marks := _by_steps(place[at[k] : at[k + 1]] - first[k], lines)) is not None]
-    found = _places_of_marks(np.array(seen).reshape(-1, lines), lines)
-    if found is None:
+        seen = [
+            at_marks for k in one if (at_marks := _by_steps(place[at[k] : at[k + 1]] - first[k], lines)) is not None
+        ]
+    known = _places_of_marks(np.array(seen).reshape(-1, lines), lines)
+    if known is None:
         return None
-    marks, scatter, bound = found
+    marks, scatter, bound = known
     laid = _Laid(lines, marks, max(LEAST_SCATTER, scatter), bound)
     at_end = _Laid(lines, marks, LOOSER * laid.scatter, LOOSER * bound)
     numbers = np.full(edges.size, -1, dtype=np.int64)

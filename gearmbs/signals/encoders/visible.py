@@ -84,10 +84,11 @@ def visible_orders(
         Order(o, whole_number(o), whole_number(gearing.on_second(o)), h) for h in fine for o in (gearing.mesh * h,)
     ]
     refused += _onto(lost)
-    if not any(o.harmonic for o in orders):
+    if not orders or (harmonics is not None and not any(o.harmonic for o in orders)):
         raise SignalError(
-            f"lines: {trains[0].lines} and {trains[1].lines} marks show no mesh harmonic. {' '.join(refused)} Use "
-            "discs of more lines, no multiple of the teeth"
+            f"lines: {trains[0].lines} and {trains[1].lines} marks show no mesh harmonic"
+            f"{'' if orders else ' nor any order of the shafts'}. {' '.join(refused)} Use discs of more lines, no "
+            "multiple of the teeth"
         )
     return orders, refused, remarks
 

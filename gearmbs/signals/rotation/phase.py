@@ -166,8 +166,8 @@ def phase_from_tacho(
             )
     if faults != "keep" and (jump := sudden_jump(numbers, edges[kept_edges], max(1, round(pulses_per_rev)))):
         notes.append(
-            f"Tacho {name!r}: CHECK THE COUNT: {jump}. The speed is that of the pulses as they come; raise the level of "
-            "weak marks (threshold=...), or take the time before or behind alone."
+            f"Tacho {name!r}: CHECK THE COUNT: {jump}. The speed is that of the pulses as they come; raise the level "
+            "of weak marks (threshold=...), or take the time before or behind alone."
         )
     for note in notes:
         warn(note, UserWarning)

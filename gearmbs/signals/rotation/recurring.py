@@ -22,7 +22,7 @@ BESIDE = 4
 FURTHEST = 8
 """Marks by which a turn may be numbered wrongly to be known for that."""
 STEADY_TURNS, BETWEEN = 3, 2
-"""Turns before and behind a jump of the speed that must be alike, and at most those between, in which marks are mended."""
+"""Turns before and behind a jump of the speed that must be alike, and those between at most, where marks are mended."""
 JUMP_OVER_REST = 0.2
 """Part of a jump's logarithm by which the turns on either side may differ among themselves."""
 NEAR_RATIO, COURSE = 0.015, 0.3

@@ -182,7 +182,7 @@ def test_a_mark_doubled_from_some_turn_on():
 @pytest.mark.parametrize(("amount", "share"), [(0.01, 0.001), (0.01, 0.05), (0.2, 0.01)])
 def test_many_lines_of_which_no_turn_is_whole(amount, share):
     """1024 lines: of each turn some are lost; the steps count them, turns beside each other give the marks."""
-    times, n, errors, index = record(1024, uneven(1024, amount), turns=12, swing=2e-4)
+    times, n, _, _ = record(1024, uneven(1024, amount), turns=12, swing=2e-4)
     index = np.interp(1024 * np.arange(1, 11) - 0.5, n, times)
     seen = times[np.random.default_rng(2).random(times.size) > share]
     train = pulse_train(seen, 1024, index=index)
