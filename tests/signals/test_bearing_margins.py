@@ -14,6 +14,7 @@ from gearmbs.signals.diagnosis.bearing_judgement import Evidence, Judged, chance
 from gearmbs.signals.diagnosis.bearing_margins import agreed, answers_at, verdicts_of
 from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed, far_shaft, find_shaft
 from gearmbs.signals.diagnosis.bearings import channel_spectrum
+from gearmbs.studies import bearing_rig, housing_signal
 from tests.says import says
 from tests.signals.test_bearing_diagnosis import LINES, RATE, SHAFT, TIME, pulses, record
 
@@ -444,3 +445,52 @@ def test_a_run_up_told_wrongly_does_not_acquit(off):
     assert "CHECK THE SPEED" in doubted.verdict
     assert "Not certain" in doubted.verdict
     assert told(noise, off).remarks == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("designation", "speed", "load"), [("6305", 900, 3500), ("6305", 1200, 4500), ("6305", 900, 1500)]
+)
+def test_a_sound_bearing_across_its_load_is_not_accused(designation, speed, load):
+    """The stiffness that varies moves the housing across the load by more than along it, up to a mode of its own."""
+    bearing = Bearing.from_designation(designation, estimate=True)
+    rig = bearing_rig(bearing, speed=f"{speed} rpm", radial_load=f"{load} N")
+    heard = housing_signal(rig.simulate(1.6, rate=12800), start=0.2).sel(channel=["y"])
+    report = diagnose_bearing(heard, bearing, f"{speed} rpm", shafts=())
+    assert report.fault is None
+    assert re.search(says("outer race", "quiet", "stiffness that varies"), report.verdict)
+    assert report.tables()["bearing_evidence"]["modulated"].max() > 0.03
+    assert diagnose_bearing(heard, bearing, f"{speed} rpm", shafts=(), level=0.0).fault == "outer race"
+
+
+@pytest.mark.slow
+def test_blows_as_quiet_as_that_accuse_where_their_own_lines_are_not_there():
+    """0.1 m/s^2 of blows, with and without the motion at their own rate that the stiffness makes."""
+    blows = 0.1 * record(pulses(LINES.bpfo * SHAFT, jitter=0.0), noise=1e-4).values[:, 0]
+    found = diagnose_bearing(record(blows, noise=1e-6), "6205", rpm(0.0), level=0.0)
+    blows *= 0.1 / found.accused[0].modulated
+    slow = sum(0.05 / k * np.cos(2 * np.pi * k * LINES.bpfo * SHAFT * TIME + k) for k in (1, 2, 3))
+    assert diagnose_bearing(record(blows, noise=1e-5), "6205", rpm(0.0)).fault == "outer race"
+    assert diagnose_bearing(record(blows, slow, noise=1e-5), "6205", rpm(0.0)).fault is None
+
+
+def coupling(speed, jaws=3, seconds=5.0):
+    """Blows of the jaws of a coupling in step with a shaft, its orders, noise."""
+    time, turn, rng = np.arange(round(seconds * RATE)) / RATE, speed / 60.0, np.random.default_rng(5)
+    x = 0.3 * rng.standard_normal(time.size)
+    x += sum(0.4 / k * np.cos(2 * np.pi * k * turn * time + k) for k in range(1, 9))
+    for at in np.arange(0.05, seconds - 0.05, 1.0 / (jaws * turn)):
+        first = int(np.ceil(at * RATE))
+        past = time[first : first + 120] - at
+        x[first : first + 120] += (
+            30.0 * (1.0 + 0.05 * rng.standard_normal()) * np.exp(-700.0 * past) * np.sin(4400.0 * np.pi * past)
+        )
+    return make_signal(x, RATE, units="m/s^2")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [-0.02, -0.012, -0.01, 0.0, 0.012])
+def test_jaws_of_a_coupling_are_no_outer_race_whatever_speed_is_told(share):
+    """3 times the shaft found at 1480 rpm, 1.7 % beside the outer race of a 6203."""
+    report = diagnose_bearing(coupling(1480.0), ["6203"], f"{1480.0 * (1.0 + share)} rpm")
+    assert report.fault is None

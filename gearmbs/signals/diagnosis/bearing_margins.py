@@ -11,10 +11,13 @@ at a plain multiple of the told speed, and at no other, is told in the same way.
 **Level.** The stiffness of a sound bearing changes as elements pass through the load (varying compliance), and waves of
 its rings do the same. Where nothing hides them, as in a calculation or on a quiet rig, the lines of that motion are as
 clear as those of a defect. But the motion is smooth. Its lines die away, while blows reach far above their own rate:
-from twenty times the line on, the modulated part of the acceleration of a housing is 1e-5 to 8e-3 m/s^2 RMS with sound
-bearings and 0.7 to 45 m/s^2 with spalls of 0.3 to 1.5 mm (deep groove ball bearings 6205 and 6208 on a rig of 3 kg at
-600 to 3600 rpm and 200 to 2500 N; docs/howto/bearings.md). The limit lies between them and above what accelerometers
-resolve, some 3e-3 m/s^2.
+from twenty times the line on, the modulated part of the acceleration of a housing along the load is 1e-5 to 8e-3 m/s^2
+RMS with sound bearings and 0.7 to 45 m/s^2 with spalls of 0.3 to 1.5 mm (deep groove ball bearings 6205 and 6208 on a
+rig of 3 kg at 600 to 3600 rpm and 200 to 2500 N; docs/howto/bearings.md). The limit lies between them and above what
+accelerometers resolve, some 3e-3 m/s^2. Across the load and under heavy ones a sound bearing makes up to 0.17 m/s^2
+(6305, 6308, 300 to 1800 rpm, a fifth of C), where the slow motion meets a mode of the housing; but then its own line
+and the next four are there as well: the modulated part is 0.3 to 3.1 times these, with spalls 20 to 800 times along the
+load, and in public recordings of outer races 2.7 times and more, all of them above 1.8 m/s^2.
 """
 
 from __future__ import annotations
@@ -44,6 +47,9 @@ CARRIERS = 20.0
 """Carriers above so many times a line show blows; below, smooth motions have lines, too."""
 LEAST_LEVEL = 0.03
 """m/s^2 RMS of the part of the carriers that a line modulates, from which it accuses."""
+STIFFNESS, OF_OWN, OWN_LINES = 1.0, 4.0, 5
+"""m/s^2 RMS below which lines of an outer race accuse only from so many times the RMS of the first of its lines in the
+record itself on: those are what the stiffness that varies makes."""
 STANDS, BESIDE = 4.0, 30
 """Medians of the lines beside it from which a line of an envelope stands: of noise alone the largest of three is as
 high, sqrt(log2(3/p)), with the probability p of 5e-5; and how many lines to either side these are."""
@@ -147,7 +153,9 @@ def weigh(
     (there,) = answers_at([far], judge_at, SPEED_SHARE)
     own, other = leading(near.verdicts), leading(there.judged)
     lines = f"CHECK THE SPEED: lines such as a shaft's own stand at {60 * far.turns:.1f} rpm"
-    if own is None:
+    # lines that are whole multiples of the shaft that was found are its own, whatever they were taken for
+    share = SPEED_SHARE + far.doubt / far.turns
+    if own is None or _in_step(own, far.turns, share):
         beside = f"{100 * -far.deviation:+.1f} % beside these, and all is judged there"
         return Weighed(
             [replace(there, speed=replace(far, told=answer.speed.told)) for answer in answers],
@@ -155,7 +163,10 @@ def weigh(
             f"{lines}; the told {60 * told:.1f} rpm are {beside}.",
         )
     same = other is None or (own.lines, own.part) == (other.lines, other.part)
-    verdicts = near.verdicts if same else tuple(tuple(map(_doubted, channel)) for channel in near.verdicts)
+    verdicts = tuple(
+        tuple(one if same and not _in_step(one, far.turns, share) else _doubted(one) for one in channel)
+        for channel in near.verdicts
+    )
     return Weighed(answers, verdicts, f"{lines}, and none at the told {60 * told:.1f} rpm, at which all is judged.")
 
 
@@ -273,6 +284,22 @@ def agreed(verdicts: Sequence[Verdicts]) -> Verdicts:
 def carriers_from(line: float, top: float) -> float:
     """Return from which frequency carriers of a line are looked at, below a top, Hz."""
     return min(CARRIERS * line, 0.5 * top)
+
+
+def own_level(values: np.ndarray, rate: float, line: float) -> float:
+    """Return the RMS of a line and the next four in a record itself, in its units.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    rate, line : float
+        Hz.
+    """
+    n = values.size
+    window = np.hanning(n)
+    height = 2.0 * np.abs(scipy.fft.rfft((values - values.mean()) * window)) / window.sum()
+    places = [round(k * line * n / rate) for k in range(1, OWN_LINES + 1)]
+    return math.sqrt(0.5 * sum(float(height[max(p - 1, 0) : p + 2].max(initial=0.0)) ** 2 for p in places))
 
 
 def modulated_level(

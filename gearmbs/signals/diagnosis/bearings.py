@@ -35,13 +35,23 @@ from gearmbs.signals.diagnosis.bearing_judgement import (
 )
 from gearmbs.signals.diagnosis.bearing_margins import (
     LEAST_LEVEL,
+    OF_OWN,
+    STIFFNESS,
     Answer,
     Weighed,
     carriers_from,
     modulated_level,
+    own_level,
     weigh,
 )
-from gearmbs.signals.diagnosis.bearing_report import CAGE, BearingLines, BearingReport, PartFinding, bearing_lines
+from gearmbs.signals.diagnosis.bearing_report import (
+    CAGE,
+    OUTER,
+    BearingLines,
+    BearingReport,
+    PartFinding,
+    bearing_lines,
+)
 from gearmbs.signals.diagnosis.bearing_speed import TOLERANCE
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.optical import instrument_faults
@@ -460,8 +470,9 @@ def _finding(
     loud = grade in (CLEAR, SIGNS, SHIFTED)
     # of a rate that is told too high, lines and bands are as much wider apart
     widest = highest * max(1.0, evidence.found / evidence.kinematic)
-    modulated = _modulated(signal, evidence.found, widest) if loud else math.nan
-    if modulated < level:
+    modulated, own = _modulated(signal, evidence.found, widest) if loud else (math.nan, math.nan)
+    smooth = part == OUTER and modulated < STIFFNESS * level / LEAST_LEVEL and modulated < OF_OWN * own
+    if modulated < level or smooth:
         grade = QUIET
     elif grade in (CLEAR, SIGNS) and part != CAGE and is_smooth(evidence):
         grade = SMOOTH
@@ -473,24 +484,27 @@ def _finding(
     )  # fmt: skip
 
 
-def _modulated(signal: xr.DataArray, line: float, highest: float) -> float:
-    """Return the level that a line modulates, m/s^2; NaN for what is no motion.
+def _modulated(signal: xr.DataArray, line: float, highest: float) -> tuple[float, float]:
+    """Return the level that a line modulates and that of the line and the next ones, m/s^2; NaN for what is no motion.
 
     Velocities and displacements are differentiated, and so is their noise: of these only lines count that stand in it.
     """
     try:
         dimension, factor = unit_dimension(units_of(signal)[0])
     except SignalError:
-        return math.nan
+        return math.nan, math.nan
     if dimension not in DERIVATIVE:
-        return math.nan
+        return math.nan, math.nan
     rate = rate_of(signal)
     top = EDGE * rate / 2
     if motion := dimension != "acceleration":
+        own = own_level(convert(signal, "acceleration", band=(0.5 * line, top), edges="keep").values[:, 0], rate, line)
         low = 0.5 * carriers_from(line, top)
         signal, factor = convert(signal, "acceleration", band=(low, top), edges="keep"), 1.0
+    else:
+        own = factor * own_level(signal.values[:, 0], rate, line)
     bands = lambda values, limits: _narrow_bands(values, rate, limits, highest)  # noqa: E731
-    return factor * modulated_level(signal.values[:, 0], rate, line, bands, top, standing=motion)
+    return factor * modulated_level(signal.values[:, 0], rate, line, bands, top, standing=motion), own
 
 
 def _multiple_of_turns(judged: Judged, spectra: Sequence[EnvelopeSpectrum], shaft: float, slip: float) -> int | None:
