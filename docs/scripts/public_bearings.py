@@ -6,11 +6,15 @@ recordings in these folders, those that are given, and stores what it found; the
 * of Case Western Reserve University, one ``RPM_FAULT_DIAMETER_END.npz`` for each with the channels DE, FE and BA; with
   ``--other-end`` the bearing at the end that was not hurt is judged;
 * of the Machinery Failure Prevention Technology society, as MATLAB files with the structure ``bearing``;
+* of the Center for Intelligent Maintenance Systems (IMS), ``--ims``, the first hours of its first test: tables of eight
+  channels, two of each of four new bearings; belts drive the shaft, so that other shafts are not known;
+* of the University of Electronic Science and Technology of China (UESTC), ``--uestc``, as MATLAB files
+  ``KIND_SPEED_NUMBER.mat`` of a pillow block without load;
 * of a gearbox rig of SpectraQuest, tables of four channels at 12.8 kHz and 30 turns a second.
 
 The true speed is that of the shaft's own lines in all channels of a recording together, and the nominal one where there
 are none; each is judged from one channel, with the speed told right, off by 0.2, 0.5 and 3 %, and as the name plate
-says.
+says. Those of IMS and UESTC are judged at their nominal speed alone.
 """
 
 from __future__ import annotations
@@ -149,6 +153,39 @@ def gears(folder: Path) -> Iterator[dict[str, Any]]:
                 yield {"group": "gears", "record": f"{path.name} {channel} {bearing}", "part": None, "+0.0": fault}
 
 
+def ims(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield what is named of new bearings at their nominal 2000 rpm; the first test ended five weeks later."""
+    from gearmbs.signals import diagnose_bearing, make_signal
+
+    share = 0.331 / 2.815 * math.cos(math.radians(15.17))
+    multiples = {
+        "name": "ZA-2115", "FTF": 0.5 * (1.0 - share), "BSF": 0.5 * (1.0 - share**2) * 2.815 / 0.331,
+        "BPFO": 8.0 * (1.0 - share), "BPFI": 8.0 * (1.0 + share),
+    }  # fmt: skip
+    for path in sorted(folder.rglob("2003.10.22.*")):
+        for channel, values in enumerate(np.loadtxt(path).T, start=1):
+            fault = diagnose_bearing(make_signal(G * values, 20000.0, units="m/s^2"), multiples, "2000 rpm").fault
+            yield {"group": "IMS, new bearings", "record": f"{path.name} {channel}", "part": None, "+0.0": fault}
+
+
+def uestc(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield what is named of a pillow block at its nominal speed."""
+    from gearmbs.signals import diagnose_bearing, make_signal
+    from gearmbs.signals.diagnosis.bearing_report import NOT_CERTAIN
+
+    parts = {"N": None, "I": "inner race", "O": "outer race", "B": "rolling element"}
+    kinds = {"N": "sound", "I": "races", "O": "races", "B": "balls"}
+    for path in sorted(folder.rglob("*_*_*.mat")):
+        kind, speed, _ = path.stem.split("_")
+        file = scipy.io.loadmat(path, squeeze_me=True)
+        signal = make_signal(np.asarray(file["Data"], dtype=float), float(file["SampleFrequency"]), units="m/s^2")
+        report = diagnose_bearing(signal, "6204", f"{speed} rpm", shafts=())
+        open_ = any(finding.grade in NOT_CERTAIN for finding in report.findings)
+        named = report.fault or ("not certain" if open_ and kind != "N" else None)
+        row = {"group": f"UESTC, {kinds[kind]}", "record": path.stem, "part": parts[kind], "rpm": float(speed)}
+        yield row | {"+0.0": named, "nominal": named}
+
+
 def found() -> pd.DataFrame:
     """Return what is stored."""
     rows = pd.DataFrame(json.loads(STORED.read_text(encoding="utf-8"))).astype(object)
@@ -164,6 +201,8 @@ def kind_of(named: Any, part: str | None) -> str:
     return "named right" if named == part else "by the cage" if named == "cage" else "another part"
 
 
+ONCE = ("UESTC, races", "UESTC, balls")
+"""Groups that are judged at one speed."""
 COUNTED = ("named right", "by the cage", "another part", "not certain", "not named")
 
 
@@ -174,7 +213,7 @@ def summary() -> str:
     lines = ["| recordings | number | told speed | " + " | ".join(COUNTED) + " |", "|---" * (3 + len(COUNTED)) + "|"]
     faulty = rows[rows["part"].notna()]
     for group, members in faulty.groupby("group"):
-        for name in told:
+        for name in told[-1:] if group in ONCE else told:
             count = Counter(kind_of(named, part) for named, part in zip(members[name], members["part"], strict=True))
             words = name if name == "nominal" else f"{name} %"
             lines.append(
@@ -209,7 +248,7 @@ def main() -> None:
     """Judge the recordings in the folders given and store the outcome."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     sets = {"cwru": cwru, "mfpt": mfpt}
-    alone = {"gears": gears, "other-end": other_end}
+    alone = {"gears": gears, "other-end": other_end, "ims": ims, "uestc": uestc}
     for name in (*sets, *alone):
         parser.add_argument(f"--{name}", type=Path)
     asked = vars(parser.parse_args())

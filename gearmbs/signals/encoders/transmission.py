@@ -32,6 +32,7 @@ from gearmbs.signals.encoders.orders import (
 from gearmbs.signals.encoders.plausible import doubted_numbers, repeating_marks, stray_lines
 from gearmbs.signals.encoders.pulses import TURN, PulseTrain
 from gearmbs.signals.encoders.result import MeasuredTransmissionError, OrderLine
+from gearmbs.signals.encoders.turned import check_turned, level_beyond
 from gearmbs.signals.encoders.visible import (
     MOST_HARMONICS,
     Order,
@@ -188,6 +189,8 @@ def transmission_error_from_pulses(
         for k, name in enumerate(freed)
     }
     levels = Levels(gearing, orders, [m.values for m in measured], trains, mark_error, marks)
+    if any(any(shift) for shift in shifts[1:]):
+        notes += _turned(shifts, orders, gearing, measured, marks, levels)
     shadows = _shadows(gearing, orders, measured, trains)
     found = []
     for order in orders:
@@ -463,6 +466,26 @@ def _shifts(measured: Sequence[_Measured], gearing: Gearing) -> tuple[list[tuple
             )
         found.append((told[0], told[1]))
     return found, notes
+
+
+def _turned(
+    shifts: list[tuple[float, float]],
+    orders: Sequence[Order],
+    gearing: Gearing,
+    measured: Sequence[_Measured],
+    marks: Mapping[str, list[dict[Fraction, Line]]],
+    levels: Levels,
+) -> list[str]:
+    """Hold the angles of turned discs against the marks (`gearmbs.signals.encoders.turned`)."""
+    mesh = {"driver": float(gearing.mesh), "driven": float(gearing.on_second(gearing.mesh))}
+    known = dict(levels.told or {})
+    for name in mesh if not known else ():
+        level = level_beyond(levels.orders[name], levels.squares[name], mesh[name])
+        if level is None:
+            return []
+        known[name] = level
+    rows_of = lambda order, angles: _rows(order, gearing, measured, angles, marks, 0.0, 0.0)  # noqa: E731
+    return check_turned(shifts, orders, gearing, rows_of, {k: v for k, v in known.items() if not marks[k]})
 
 
 def _rows(
