@@ -234,8 +234,9 @@ def sound() -> str:
 
 
 def hard() -> str:
-    """Return the recordings that are not named right at their true speed."""
+    """Return the recordings that are not named right at their true speed, without those judged at one speed."""
     rows = found()
+    rows = rows[~rows["group"].isin(ONCE)]
     lines = ["| recording | true speed, rpm | defect | here | at the nominal speed |", "|---|---|---|---|---|"]
     for row in rows[rows["part"].notna()].itertuples(index=False):
         named, nominal = row[rows.columns.get_loc("+0.0")], row.nominal
