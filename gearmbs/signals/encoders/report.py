@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,15 +12,12 @@ import pandas as pd
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.encoders.unseen import unseen_in_words
 
-if TYPE_CHECKING:
-    from gearmbs.signals.encoders.result import MeasuredTransmissionError
-
 LISTED = 4
 """Harmonics whose lengths a report names."""
 SHAFTS = ("driver", "driven")
 
 
-def verdict_of(result: MeasuredTransmissionError) -> str:
+def verdict_of(result: Any) -> str:
     """Return what is sure, in a sentence."""
     mesh = result.harmonics()
     sure = mesh[mesh["low"] > 0.0]
@@ -50,7 +47,7 @@ def verdict_of(result: MeasuredTransmissionError) -> str:
     )
 
 
-def _change(result: MeasuredTransmissionError, load: str) -> str | None:
+def _change(result: Any, load: str) -> str | None:
     """Return what the marks are no part of: the largest harmonic of a load's difference from the first."""
     table = result.difference(load, result.loads[0])
     sure = table[table["low"] > 0.0]
@@ -64,7 +61,7 @@ def _with_interval(row: pd.Series) -> str:
     return f"{1e6 * row['amplitude']:.4g} um ({1e6 * row['low']:.4g} to {1e6 * row['high']:.4g} um)"
 
 
-def markdown_of(result: MeasuredTransmissionError) -> str:
+def markdown_of(result: Any) -> str:
     """Return the report as Markdown text, lengths in micrometres."""
     parts = [
         f"# Transmission error from {result.source}", "",
@@ -105,7 +102,7 @@ def markdown_of(result: MeasuredTransmissionError) -> str:
     return "\n".join(parts)
 
 
-def _lengths_in_words(result: MeasuredTransmissionError, load: str) -> str:
+def _lengths_in_words(result: Any, load: str) -> str:
     """Return which harmonics are known to what was asked, and what the others take."""
     table = result.record_lengths(load=load)
     if not len(table):

@@ -8,14 +8,14 @@ rest at other teeth: of 60 lines and 29 teeth a third of it, and nearly as much 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import pandas as pd
 
 from gearmbs.signals.encoders.cycle import fall
-
-if TYPE_CHECKING:
-    from gearmbs.signals.encoders.result import MeasuredTransmissionError
+from gearmbs.signals.encoders.orders import Gearing
 
 BESIDE = 2
 """Orders to either side of one whose largest says what may be there."""
@@ -25,6 +25,24 @@ RUN_OUT = 2
 OF_OTHERS = 1.5
 """What is missing from a tooth beside the run-out of the others, by that of the tooth alone: they lack as much, and
 their median keeps less than half of it."""
+
+
+class MeasuredOrders(Protocol):
+    """Orders of two shafts, as `gearmbs.signals.encoders.result` has them."""
+
+    @property
+    def gearing(self) -> Gearing:
+        """Ratio and mesh order."""
+
+    @property
+    def lines(self) -> Sequence[Any]:
+        """Of `OrderLine`."""
+
+    def of_load(self, one: Any, load: str) -> tuple[complex, float]:
+        """Return an order's complex amplitude, m, and its variance."""
+
+    def single_flank(self, load: str | None = None) -> pd.DataFrame:
+        """Return ranges, m."""
 
 
 class Unseen(NamedTuple):
@@ -50,7 +68,7 @@ class Unseen(NamedTuple):
         return OF_OTHERS * sum(height * abs(float(np.sinc(k / self.pitch))) for k, height in self.orders.items())
 
 
-def unseen(result: MeasuredTransmissionError, load: str, shaft: int) -> Unseen:
+def unseen(result: MeasuredOrders, load: str, shaft: int) -> Unseen:
     """Return what of a shaft is not seen up to twice its mesh order, and of the mesh.
 
     Orders beyond the mesh order are those of the shape of teeth within their pitch.
@@ -72,7 +90,7 @@ def unseen(result: MeasuredTransmissionError, load: str, shaft: int) -> Unseen:
     return Unseen(lacking, unseen_mesh(result, load), pitch)
 
 
-def unseen_mesh(result: MeasuredTransmissionError, load: str) -> float:
+def unseen_mesh(result: MeasuredOrders, load: str) -> float:
     """Return what mesh harmonics that are not seen come to where all add up, m, as if they fell as the number's square.
 
     Infinite where none is seen.
@@ -86,7 +104,7 @@ def unseen_mesh(result: MeasuredTransmissionError, load: str) -> float:
     return a * float(math.pi**2 / 6.0 - np.sum(numbers.astype(float) ** -2.0))
 
 
-def unseen_in_words(result: MeasuredTransmissionError, load: str) -> str | None:
+def unseen_in_words(result: MeasuredOrders, load: str) -> str | None:
     """Return which orders curves and teeth lack, where these may add more than a twentieth to the range."""
     parts, mesh = [], [one.harmonic for one in result.lines if one.harmonic]
     table = result.single_flank(load).set_index("of")

@@ -69,7 +69,7 @@ def test_orders_of_the_shafts_are_seen_where_no_mesh_harmonic_is():
     assert re.search(says("no mesh harmonic", "shafts"), result.verdict)
     assert re.search(says("harmonic 2", "driver"), result.to_markdown())
     assert "mesh_harmonics" in result.tables()
-    with pytest.raises(SignalError, match=says("no mesh harmonic", "60", "more lines")):
+    with pytest.raises(SignalError, match=says("60", "more lines")):
         transmission_error_from_pulses(discs.run(angles), (20, 29), base_radius=RADIUS, harmonics=2)
 
 
