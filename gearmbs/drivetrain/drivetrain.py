@@ -168,10 +168,15 @@ class Drivetrain(Guessed):
 
     # of which kind the part is, and so which fields it has, follows from its name
     def changed(self, name: str, **fields: Any) -> Drivetrain:
-        """Return a drivetrain with fields of one part changed; of a mesh, ``settings`` are merged."""
+        """Return a drivetrain with fields of one part changed; of a mesh, ``settings`` are merged.
+
+        Sections of a shaft take the place of its length and diameter, and the other way.
+        """
         part: Part = self.part(name)
         if isinstance(part, GearMesh) and "settings" in fields:
             fields["settings"] = {**part.settings, **fields["settings"]}
+        if isinstance(part, Shaft):
+            fields = part.changed_fields(fields)
         return self.with_parts(replace(part, **fields))
 
     # --- access by name -----------------------------------------------------------------------------

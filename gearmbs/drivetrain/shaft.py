@@ -118,12 +118,18 @@ class Shaft(Part):
             f"{self.label}: radius is {self.radius} m and diameter {self.diameter} m; give one of them",
         )
         if self.sections is not None:
-            for name in ("length", "radius", "diameter"):
+            for name in ("radius", "diameter"):
                 require(getattr(self, name) is None, f"{self.label}: give {name} or sections, not both")
             require(len(self.sections) > 0, f"{self.label}: sections is empty; give lengths and diameters")
             cut = tuple(self._section(one) for one in self.sections)
             object.__setattr__(self, "sections", cut)
-            object.__setattr__(self, "length", math.fsum(one.length for one in self.pieces))
+            whole = math.fsum(one.length for one in self.pieces)
+            # a copy of a shaft with sections is told their length, too
+            require(
+                self.length is None or math.isclose(self.length, whole, rel_tol=1e-9),
+                f"{self.label}: length is {self.length} m, its sections come to {whole:g} m; give length or sections",
+            )
+            object.__setattr__(self, "length", whole)
         elif self.length is None:
             object.__setattr__(self, "length", 0.2)
         doubt = doubt_of_density(self.density)
@@ -133,6 +139,15 @@ class Shaft(Part):
         if doubt:
             warn(f"{self.label}: {doubt}")
         self._check_modes()
+
+    def changed_fields(self, fields: dict[str, Any]) -> dict[str, Any]:
+        """Return fields to change with those that make room for them: new sections take the place of any length."""
+        if fields.get("sections") is not None:
+            return {"length": None, "radius": None, "diameter": None, **fields}
+        room = {"sections": None} if fields.keys() & {"length", "radius", "diameter"} else {}
+        for one, other in (("radius", "diameter"), ("diameter", "radius")):
+            room |= {other: None} if one in fields else {}
+        return {**room, **fields}
 
     def _check_modes(self) -> None:
         if self.modes is None:

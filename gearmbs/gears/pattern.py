@@ -60,8 +60,14 @@ class ContactPattern:
 
     @property
     def face_load_factor(self) -> float:
-        """K_Hbeta: largest load per unit width of the engagement over the mean of that moment."""
-        return float(self.pressure.max() / self.pressure[self.pressure.max(axis=1).argmax()].mean())
+        """K_Hbeta: largest load per unit width over its mean, each section's summed over the engagement.
+
+        So each section counts while it is in contact, a helical tooth's first and last ones as others do: 1 for aligned
+        wheels without modifications. The sum over one tooth's engagement is that of all teeth over a mesh, to which
+        the mesh stiffness c_gamma of ISO 6336-1 belongs. NaN where nothing is carried.
+        """
+        carried = self.pressure.sum(axis=0)
+        return float(carried.max() / carried.mean()) if carried.any() else math.nan
 
 
 def contact_pattern(

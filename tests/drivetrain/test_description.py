@@ -2,7 +2,8 @@
 
 import pytest
 
-from gearmbs.drivetrain import Drivetrain, DrivetrainError, read_description
+from gearmbs.drivetrain import Drivetrain, DrivetrainError, Shaft, SpeedDrive, read_description
+from gearmbs.gears import GearSpec
 from tests.drivetrain.support import stage
 from tests.says import says
 
@@ -128,3 +129,23 @@ shaft = "out"
     path.write_text(path.read_text().replace('"spall"', '"hole"'))
     with pytest.raises(DrivetrainError, match=r"bearing 'c': settings: .*kind 'hole' is unknown"):
         Drivetrain.from_file(path)
+
+
+STEPS = [{"length": "120 mm", "diameter": "30 mm"}, {"length": "80 mm", "diameter": "35 mm", "bore": "10 mm"}]
+
+
+def test_stepped_shafts_carry_their_own_parts_and_change():
+    """In Python as in files: copies of a shaft with sections know their length, which is no second statement of it."""
+    shaft = Shaft(name="s", sections=STEPS, wheels={"z": ("60 mm", GearSpec(20, "2 mm"))},
+                  bearings={"a": ("10 mm", "6206"), "b": ("190 mm", "6206")})  # fmt: skip
+    train = Drivetrain("t", shafts=[shaft], drives=[SpeedDrive(name="m", shaft="s", speed="100 rpm")])
+    assert {"z", "a", "b"} <= set(train.parts)
+    kept = train.changed("s", modes=4).part("s", Shaft)
+    assert (kept.length, kept.pieces) == (pytest.approx(0.2), shaft.pieces)
+    longer = train.changed("s", sections=[*STEPS, {"length": "40 mm", "diameter": "20 mm"}]).part("s", Shaft)
+    assert longer.length == pytest.approx(0.24)
+    plain = train.changed("s", length="210 mm", diameter="40 mm").part("s", Shaft)
+    assert (plain.length, plain.sections, plain.pieces[0].outer) == (pytest.approx(0.21), None, pytest.approx(0.04))
+    assert train.changed("s", radius="15 mm").changed("s", diameter="40 mm").part("s", Shaft).radius is None
+    with pytest.raises(DrivetrainError, match=says("0.3", "0.2", "length or sections")):
+        Shaft(name="s", length="300 mm", sections=STEPS)

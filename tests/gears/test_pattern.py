@@ -24,6 +24,15 @@ def test_healthy_pattern_is_even_and_carries_the_load():
     assert pattern.roll_length[20, 0] == pytest.approx(pair.driver.base_radius * np.tan(np.radians(20)), rel=1e-3)
 
 
+@pytest.mark.parametrize("teeth", [17, 25])
+def test_helical_faces_without_tilt_are_loaded_evenly(teeth):
+    """Each section is in contact for a part of the engagement; what is left is the sum of lengths of contact lines."""
+    wheels = [GearSpec(z, "4 mm", helix_angle="10 deg", hand=hand, face_width="40 mm")
+              for z, hand in ((teeth, "right"), (68, "left"))]  # fmt: skip
+    pattern = contact_pattern(GearPair(*wheels, torque=770.0).with_own_stiffness(), sections=21)
+    assert 1.0 < pattern.face_load_factor < 1.03
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("rotation", [1, -1])
 def test_shares_of_a_tooth_and_the_next_add_up(rotation):
