@@ -8,6 +8,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from gearmbs.signals import (
@@ -22,6 +23,7 @@ from gearmbs.signals import (
     to_signal,
     write_signal,
 )
+from gearmbs.signals.analysis.report import name_lines
 from gearmbs.signals.rotation.mesh_shaft import mesh_shaft
 from gearmbs.signals.rotation.shaft import Known
 from tests.says import says
@@ -306,3 +308,19 @@ class TestMeasuredRecords:
             case = {"state": "healthy" if name[0] == "h" else "broken", "load": f"{name[5:]} %"}
             found = report.data["experiment"].sel(case).transpose("harmonic", "channel")
             np.testing.assert_allclose(found, levels, atol=6e-5)
+
+
+def test_lines_that_cannot_be_told_apart_have_the_simplest_name():
+    """A box's 0.3 s: lines of 3.3 Hz hold a slow shaft's sidebands, and harmonics of one mesh beside another's."""
+    known = {
+        "2 x GMF of stage 2": 261.22, "2 x GMF of stage 2 -1 x output": 259.3,
+        "7 x GMF of stage 2": 914.28, "2 x GMF of stage 1 -1 x input": 912.67,
+        "2 x GMF of stage 1": 937.3, "2 x GMF of stage 1 +1 x input": 962.0, "38 x input": 937.3,
+    }  # fmt: skip
+    lines = pd.DataFrame({"frequency": [260.0, 913.3, 936.7, 963.3, 500.0]})
+    assert list(name_lines(lines, known, 5.0).of) == [
+        "2 x GMF of stage 2", "7 x GMF of stage 2", "2 x GMF of stage 1 or 38 x input",
+        "2 x GMF of stage 1 +1 x input", "",
+    ]  # fmt: skip
+    # resolved, the sideband has its name
+    assert name_lines(lines[:1], known, 0.75).of[0] == "2 x GMF of stage 2 -1 x output"

@@ -124,14 +124,23 @@ def strongest_lines(
 def name_lines(lines: pd.DataFrame, known: Mapping[str, float], within: float) -> pd.DataFrame:
     """Add the column ``of``: which of the known lines (name to Hz) is nearest, or empty if none is near enough.
 
-    Lines at one frequency are all named, as those of shafts that turn together.
+    Of lines that are too near to be told apart the simplest is named, a mesh harmonic before a sideband of another:
+    one that is a multiple of fewer frequencies. Lines at one frequency are all named, as those of shafts that turn
+    together.
     """
     frequencies = np.array(list(known.values()))
+    parts = np.array([name.count(" x ") for name in known])
     names = []
     for f in lines["frequency"]:
-        nearest = frequencies[np.argmin(np.abs(frequencies - f))]
-        same = [name for name, at in known.items() if math.isclose(at, nearest, rel_tol=SAME_LINE)]
-        names.append(" or ".join(same) if abs(nearest - f) <= within else "")
+        off = np.abs(frequencies - f)
+        possible = off <= within
+        if not possible.any():
+            names.append("")
+            continue
+        simplest = possible & (parts == parts[possible].min())
+        nearest = frequencies[np.flatnonzero(simplest)[np.argmin(off[simplest])]]
+        alike = [math.isclose(at, nearest, rel_tol=SAME_LINE) for at in frequencies]
+        names.append(" or ".join(name for name, one, same in zip(known, simplest, alike) if one and same))
     return lines.assign(of=names)
 
 
