@@ -195,11 +195,9 @@ def checked_format(path: Path, format: str | None) -> tuple[str, str]:
     content = _content(path)
     format = _format(path, format, content)
     if not format_of(format).accepts(content):
-        raise SignalFileError(
-            path,
-            f"is named as {format} but holds {_words(content)}; rename it or pass format=... "
-            f"(one of {', '.join(TABLE)})",
-        )
+        fits = [name for name in TABLE if format_of(name).accepts(content)]
+        given = " or ".join(f"format={name!r}" for name in fits) or f"format=... (one of {', '.join(TABLE)})"
+        raise SignalFileError(path, f"is named as {format} but holds {_words(content)}; rename it or pass {given}")
     return format, content
 
 
