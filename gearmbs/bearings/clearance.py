@@ -25,7 +25,7 @@ from gearmbs.mechanism.parts.elements import NOT_NEGATIVE, POSITIVE, Compiled, F
 
 @dataclass(eq=False, repr=False)
 class ClearanceForce(ForceElement):
-    """The force of a bore, marker J, on a journal, marker I; ``reals`` as in `gearmbs.bearings.clearance`."""
+    """The force of a bore, marker J, on a journal, marker I; ``reals`` are `CLEARANCE` to `DEPTH` below."""
 
     reals: tuple[float, ...]
 
@@ -38,7 +38,6 @@ class ClearanceForce(ForceElement):
     )
 
     def compiled(self) -> Compiled:
-
         settings = {
             "stiffness": Setting(STIFFNESS, f"N/m^{self.reals[EXPONENT]:g}", allowed=POSITIVE),
             "damping": Setting(DAMPING, "N*s/m", allowed=NOT_NEGATIVE),
@@ -56,7 +55,7 @@ class ClearanceForce(ForceElement):
 #
 #     delta = e - c,    delta' = n . u,    f = max(0, K delta^m + C S(delta) delta'),    F = -f n,
 #
-# S being the STEP of the damping over a depth, as in IMPACT. Variations:
+# S being the STEP of the damping over a depth, as in IMPACT ("Bearings" in the theory of drivetrains). Variations:
 #
 #     d delta = n . (dr - (r . z) dz),    dn = (d rho - n d delta) / e,    dF = -(f_d d delta + f_v d delta') n - f dn.
 
@@ -129,6 +128,7 @@ def clearance_bearing(ints, reals, t, frames, states, inputs, want, work, wrench
         along += r[q] * z[q]
     size = 0.0
     for q in range(3):
+        # rho, until it is divided by e below
         n[q] = r[q] - along * z[q]
         size += n[q] * n[q]
     e = np.sqrt(size)
@@ -154,9 +154,11 @@ def clearance_bearing(ints, reals, t, frames, states, inputs, want, work, wrench
     if not want & DERIVATIVES:
         return
     unit, dr, dz, du = work[15:18], work[18:21], work[21:24], work[24:27]
+    # by the variations [dR, dpi, dv, dw] of I, then of J; kinds 0 to 3 are dR, dpi, dv, dw, of which q is a component
     for column in range(24):
         kind, q = (column % 12) // 3, column % 3
         of_j = column >= 12
+        # the force is at I's origin, where neither I's orientation nor its angular velocity count
         if not of_j and kind % 2 == 1:
             continue
         for k in range(3):
@@ -164,11 +166,13 @@ def clearance_bearing(ints, reals, t, frames, states, inputs, want, work, wrench
             dr[k] = dz[k] = du[k] = 0.0
         sign = -1.0 if of_j else 1.0
         if kind == 0:
+            # u has -w_J x r in it
             dr[q] = sign
             _cross(spin, 0, unit, 0, du, 0)
             for k in range(3):
                 du[k] *= -sign
         elif kind == 1:
+            # J turns: dz = dpi x z; r is held, and w_J with it
             _cross(unit, 0, z, 0, dz, 0)
         elif kind == 2:
             du[q] = sign

@@ -303,7 +303,7 @@ def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want
     Notes
     -----
     Memory-free: the result is a function of the arguments alone. No contact is found when the axes are more than
-    120 degrees apart or the base circles overlap.
+    120 degrees apart, those of helical wheels more than 20, or the base circles overlap.
     """
     for i in range(6):
         wrench[i] = 0.0

@@ -11,7 +11,7 @@ from gearmbs.contact.records import kernel, strip_at
 from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
 from gearmbs.contact.support.profiles import GENTLE
 
-STEEPEST = 3.0  # how much steeper the corner gap may grow than that bound
+STEEPEST = 3.0  # how much faster `path_excess` may fall beyond an end of the face than between its last two nodes
 BENDING = 4.0  # bound of the gap's bending along the face of an internal pair, as a multiple of the tilt squared
 SAME_PITCH = 1e-13  # tilt times the tangent of the base helix below which all pairs of helical flanks have one gap
 PITCHES_APART = 2.5  # bound of how normal pitches of tilted helical wheels differ, as a multiple of that product
@@ -21,7 +21,9 @@ UNBOUNDED = 1e9  # curvature of a corner gap, 1/m, where the tip reaches beyond 
 
 @kernel
 def open_side(wheels, side):
-    """Fill what the pose implies, the same for both sides of the teeth; False when the base circles meet.
+    """Fill what the pose implies, the same for both sides of the teeth; False where no contact is looked for.
+
+    That is when the base circles meet, or helical wheels' axes are more than 20 degrees apart.
 
     With an internal wheel 2 its base radius, the centre distance and the length of the line of action are negative;
     all that follows holds for both.
@@ -29,13 +31,14 @@ def open_side(wheels, side):
     a, p, q = side.x[L.A], side.x[L.P], side.x[L.Q]
     rb1, rb2 = wheels.wheel_1.base_radius, wheels.wheel_2.base_radius
     Rb = rb1 + rb2
+    # the line of action's length is divided by, and at least 1.4 % of the centre distance here
     if abs(a) <= abs(Rb) * 1.0001:
         return False
     if p * p + q * q > STEEPEST_HELICAL and wheels.wheel_1.twist != 0.0:
         return False
     length = np.copysign(np.sqrt(a * a - Rb * Rb), a)
-    lean = p * p + q * q
-    w = np.sqrt(1.0 - lean)
+    tilt_squared = p * p + q * q
+    w = np.sqrt(1.0 - tilt_squared)
     i_w = 1.0 / w
     one = 1.0 / (1.0 + w)
     m = i_w * one
@@ -47,17 +50,17 @@ def open_side(wheels, side):
     side.m = m
     side.m_w = -(1.0 + 2.0 * w) * m * m
     side.m_ww = 2.0 * m * m * ((1.0 + 2.0 * w) * (1.0 + 2.0 * w) * m - 1.0)
-    side.gentle = 1.0 if 0.5 * lean * m < GENTLE else 0.0
+    side.gentle = 1.0 if 0.5 * tilt_squared * m < GENTLE else 0.0
     side.base_1, side.base_2, side.base_sum, side.base_difference = rb1, rb2, Rb, rb1 - rb2
     side.length = length
     side.alpha_0 = np.arctan2(abs(length), abs(Rb))
     side.sin_0 = length / a
     side.cos_0 = Rb / a
-    lean = abs(wheels.wheel_1.twist) * np.sqrt(lean)
+    tilt_of_helix = abs(wheels.wheel_1.twist) * np.sqrt(tilt_squared)
     side.pitch_mismatch_bound = 0.0
-    if lean > SAME_PITCH:
+    if tilt_of_helix > SAME_PITCH:
         side.pitch_mismatch_bound = (
-            PITCHES_APART * lean * (abs(length) + 2.0 * wheels.pitch + wheels.face_high - wheels.face_low)
+            PITCHES_APART * tilt_of_helix * (abs(length) + 2.0 * wheels.pitch + wheels.face_high - wheels.face_low)
         )
     return True
 
@@ -204,7 +207,7 @@ def flank_strips(scratch, slices, want):
 
 @kernel
 def corner_growth(length, tip, rb):
-    """Curvature of a corner's gap beyond the path of contact, 1/m."""
+    """Return L T / (2 (L - T) r_b^2), the factor of x^2 in a corner's gap at x beyond the path of contact, 1/m."""
     # beyond the line of action's end there is no bound; an internal wheel's tip meets its own end from the other side
     if (length - tip) * length * tip <= 0.0:
         return UNBOUNDED
@@ -218,7 +221,9 @@ def teeth_in_reach(wheels, side, depth, wander):
     A corner bears beyond the path of contact while it has a foot on the mate's involute and its gap is below ``depth``.
     The gap grows at first, from a parabola on, and is never less than the one with which the corner passes the mate's
     tip: up to that depth the parabola bounds the reach, beyond it the foot does. ``wander`` is how far the contact
-    moves along the profile over the face. The least depth reaches nothing beyond the path, an infinite one all feet.
+    moves along the profile over the face. See "How far a corner reaches" in the theory of contact: of the formula there
+    ``wheels.passing_gap`` is G_t, ``wheels.corner_share`` the part of the parabola that kappa is, and
+    ``wheels.corner_reach`` how far there are feet, places of the corner on the mate's involute.
     """
     tip_1, tip_2, length = wheels.wheel_1.tip_roll, wheels.wheel_2.tip_roll, side.length
     rb1, rb2, pitch = side.base_1, side.base_2, wheels.pitch

@@ -244,7 +244,10 @@ def given_by_momenta(at: dict[str, int], formulation: int) -> np.ndarray:
 
 
 def error_mask(at: dict[str, int], formulation: int, states: np.ndarray) -> np.ndarray:
-    """Return whose error an integrator is to control: positions, with rate rows velocities, differential states."""
+    """Return whose error an integrator is to control: positions, with rate rows velocities, differential states.
+
+    Momenta are functions of these. Multipliers and loads are algebraic: their errors do not accumulate.
+    """
     mask = np.zeros(at["n"], dtype=bool)
     mask[at["R"] : at["lambda"]] = True
     mask[at["z"] : at["mu"]] = states

@@ -345,7 +345,9 @@ def _terms(functions, st, old, suspect, part, out):
 def _pole_between(functions, st, old):
     """Return whether there is a pole on the way of the suspected unknowns; note in ``st`` of which and where.
 
-    ``st.delta`` marks them afterwards; the prediction is overwritten.
+    There is one if the terms without a rate of some equation have another sign at the two ends of the way (else
+    nothing is divided) and grow by `GROWTH` with each of `FEWEST` divisions or more of the part in which they turn.
+    ``st.delta`` marks the suspects afterwards; the prediction is overwritten.
     """
     n = st.y.shape[0]
     suspect = st.delta
@@ -357,6 +359,7 @@ def _pole_between(functions, st, old):
     for i in (st.pole, st.leapt):
         if i >= 0:
             suspect[i] = 1.0
+    # there is one: of `passes_pole` it is a condition, and `_rates_hold` fails by entries that outrun the step alone
     first = 0
     while suspect[first] == 0.0:
         first += 1
@@ -403,6 +406,7 @@ def _pole_between(functions, st, old):
         fm = at_m[row]
     if divisions < FEWEST:
         return False
+    # all suspects have gone the same part of their ways: the first tells where, whichever row has grown
     st.pole = first
     st.pole_met = True
     st.pole_at = _place(st, old, first, m)

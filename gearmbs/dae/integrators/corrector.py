@@ -48,7 +48,7 @@ def set_weights(st, y, h):
 
     Algebraic unknowns outside error control (multipliers, forces) reach the others only through a step of size h, and
     h times their error is what the corrector test sees; taken at face value their rounding noise, which grows
-    like 1/h, would never let a small step converge.
+    like 1/h, would never let a small step converge. Beyond a second they are held to their own tolerance.
 
     Parameters
     ----------
@@ -257,6 +257,8 @@ def correct(functions, st, plan, factors):
                 st.rate = 1.0
                 return _verdict(functions, st, rate)
             st.rate = max(rate, RATE_MEMORY * st.rate)
+        # corrections that fall by this rate leave norm (trust + trust^2 + ...) = norm trust / (1 - trust) undone;
+        # a second correction, or none at all, confirms the rate:
         trust = max(st.rate, RATE_FLOOR)
         # where G is not linear in y', what other steps have seen of the convergence holds nothing
         seen = m > 0 or norm == 0.0 or iterations == 1 or not st.nonlinear_rates

@@ -76,7 +76,8 @@ class RunState(Struct):
     atol : ndarray, shape (n,)
         Absolute tolerances.
     controlled, tested, differential, coupled : ndarray, shape (n,)
-        1 for unknowns under error control, for those the corrector test looks at, for those whose derivative appears,
+        1 for unknowns under error control, for those the corrector test looks at, for those that cannot jump
+        (`DAEProblem.goes_on`: their derivative appears, or they follow from such ones, as velocities do from momenta),
         and for those that it judges by their tolerance whatever the step: controlled, differential, or of index one.
     index_one : ndarray, shape (n,)
         1 for algebraic unknowns that equations without derivatives determine, else 0.

@@ -334,7 +334,7 @@ def correction_norm(st, row):
         delta[i] = y[i] - y_pred[i]
         row[i] = y[i]
     if st.n_past <= 1:
-        # algebraic unknowns may jump where a run starts afresh
+        # algebraic unknowns may jump where a run starts afresh; eps and v_f, which follow from momenta, may not
         for i in range(y.shape[0]):
             delta[i] *= st.differential[i]
     return weighted_max(delta, st.w_error)

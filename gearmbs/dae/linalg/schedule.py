@@ -106,7 +106,7 @@ def through_node(first, stop, size, l_ptr, l_vals, w):
 
 @njit(_IVEC(_IVEC), cache=True, nogil=True, error_model="numpy")
 def sorted_by(keys):
-    """Return the order that sorts small keys, equal ones as they stand."""
+    """Return the order that sorts small keys, equal ones as they stand: a counting sort, which is stable."""
     largest = 0
     for key in keys:
         largest = max(largest, key)
@@ -174,6 +174,7 @@ def _operations(rank, a_ptr, a_pos, u_ptr, u_pos, l_ptr, l_pos, level, l_at, u_a
     a_to, levels = np.empty(a_pos.shape[0], dtype=np.uint32), np.empty(count, dtype=np.int64)
     op_to, op_l = np.empty(count, dtype=np.uint32), np.empty(count, dtype=np.uint32)
     op_u = np.empty(count, dtype=np.uint32)
+    # where each row of the column at work stands among the numbers of the factors: filled, used, and emptied again
     at = np.full(n, nowhere)
     e = 0
     for k in range(n):
@@ -307,6 +308,7 @@ def operations_in_order(rank, tail, a_ptr, a_pos, u_ptr, u_pos, u_col, l_ptr, l_
     a_to, levels, op_to, op_l, op_u = _operations(
         rank, a_ptr, a_pos, u_ptr, u_pos, l_ptr, l_pos, level, l_at, u_at, pivot_at
     )
+    # op_l needs no time of its own: a column that acts is of a lower level, and its L is divided when that one ends
     order = sorted_by(earliest_times(op_to, op_u, below + above + n))
     order = order[sorted_by(levels[order])]
     l_level = np.empty(below, dtype=np.int64)

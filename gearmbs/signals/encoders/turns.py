@@ -94,6 +94,7 @@ def counted_turns(edges: np.ndarray, lines: int, index: np.ndarray) -> Counted |
     turns = turns_between(once, np.diff(at), lines)
     if turns is None:
         return None
+    # 1. course: turns over time, through the index pulses
     course = scipy.interpolate.CubicSpline(once, np.concatenate(([0], np.cumsum(turns))))
     place = course(edges)
     # a cubic that runs on beyond its points bends as it likes: the speed is that of the turn beside
@@ -102,6 +103,7 @@ def counted_turns(edges: np.ndarray, lines: int, index: np.ndarray) -> Counted |
     place[late] = turns.sum() + (edges[late] - once[-1]) * turns[-1] / (once[-1] - once[-2])
     if np.any(np.diff(place) <= 0.0):
         return None
+    # 2. marks: their places in a turn, from the turns in which every mark has its pulse
     first = np.concatenate(([0], np.cumsum(turns)))
     one = np.flatnonzero(turns == 1)
     seen = [place[at[k] : at[k + 1]] - first[k] for k in one if at[k + 1] - at[k] == lines]
@@ -113,6 +115,7 @@ def counted_turns(edges: np.ndarray, lines: int, index: np.ndarray) -> Counted |
     known = _places_of_marks(np.array(seen).reshape(-1, lines), lines)
     if known is None:
         return None
+    # 3. laying: the pulses of each part between index pulses, and before and behind them, to these marks
     marks, scatter, bound = known
     laid = _Laid(lines, marks, max(LEAST_SCATTER, scatter), bound)
     at_end = _Laid(lines, marks, LOOSER * laid.scatter, LOOSER * bound)
