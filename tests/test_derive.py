@@ -12,6 +12,7 @@ import pytest
 
 from gearmbs.kernels import derive
 from gearmbs.kernels.derive import ONE, ZERO, Function, choose, derivative, given, inputs, slopes, tangent
+from gearmbs.kernels.named import names_in, told_names
 from tests.jets import jets
 from tests.says import says
 
@@ -30,6 +31,27 @@ def test_text_does_not_hang_on_hashes(seed):
     there = {**os.environ, "PYTHONHASHSEED": seed}
     made = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, env=there, check=True)
     assert made.stdout == path.read_text(encoding="utf-8")
+
+
+def test_lines_are_told_by_the_names_of_the_definition():
+    derive.start()
+    x, y = inputs("x y")
+
+    def law(x, y):
+        length = np.sqrt(x * x + y * y)
+        force = [length * x, length * y]
+        return force
+
+    with names_in(__file__, derive.Value) as (single, items):
+        force = law(x, y)
+    first = derivative(np.sqrt(x * x + y * y), x)
+    second, along = derivative(first, y), derivative(force[0], y)
+    told = told_names(single, items, derive._slopes)
+    assert told[np.sqrt(x * x + y * y)] == "length"
+    assert told[force[1]] == "force[1]"
+    assert told[first] == "d length / d x"
+    assert told[second] == "d (d length / d x) / d y"
+    assert told[along] == "d force[0] / d y"
 
 
 def compiled(function: Function):

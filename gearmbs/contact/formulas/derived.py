@@ -14,11 +14,11 @@ def pose_rates(x, w, twist, xd):
     a, h, p, q, rx, ry, rz, ox = x[0], x[1], x[2], x[3], twist[0], twist[1], twist[2], twist[3]
     oy, oz = twist[4], twist[5]
     _0 = 1.0 / w
-    _1 = 0.5 * oy - (0.5 * (_0 * (q * oz)))
-    _2 = 0.5 * (_0 * (p * oz)) - (0.5 * ox)
+    _1 = 0.5 * oy - (0.5 * (_0 * (q * oz)))  # mx
+    _2 = 0.5 * (_0 * (p * oz)) - (0.5 * ox)  # my
     _3 = (ry + h * _2) * (1.0 / a)
-    _4 = 1.0 / (1.0 + w)
-    _5 = p * _2 - (q * _1)
+    _4 = 1.0 / (1.0 + w)  # share
+    _5 = p * _2 - (q * _1)  # tilted
     xd[0] = -(rx + h * _1)
     xd[1] = a * _1 - rz
     xd[2] = w * _1 - (q * _3)
@@ -33,7 +33,7 @@ def pose_rate_slopes(x, w, twist, xd_x):
     a, h, p, q, ry, ox, oy, oz = x[0], x[1], x[2], x[3], twist[1], twist[3], twist[4], twist[5]
     _0 = 1.0 / w
     _1 = q * oz
-    _2 = 0.5 * oy - (0.5 * (_0 * _1))
+    _2 = 0.5 * oy - (0.5 * (_0 * _1))  # mx
     _3 = p * _0
     _4 = _0 * _0
     _5 = _3 * _4
@@ -43,27 +43,27 @@ def pose_rate_slopes(x, w, twist, xd_x):
     _9 = _0 * oz
     _10 = _1 * _8 + _9
     _11 = p * oz
-    _12 = 0.5 * (_0 * _11) - (0.5 * ox)
+    _12 = 0.5 * (_0 * _11) - (0.5 * ox)  # my
     _13 = ry + h * _12
-    _14 = 1.0 / a
+    _14 = 1.0 / a  # d own / d ry
     _15 = _13 * (_14 * _14)
-    _16 = _12 * _14
+    _16 = _12 * _14  # d own / d h
     _17 = _9 + _11 * _5
     _18 = _14 * (h * _17)
     _19 = _13 * _14
     _20 = _11 * _8
     _21 = _14 * (h * _20)
     _22 = 0.5 * _18
-    _23 = p * _12 - (q * _2)
+    _23 = p * _12 - (q * _2)  # tilted
     _24 = 1.0 + 2.0 * w
     _25 = _23 * _24
-    _26 = 1.0 / (1.0 + w)
+    _26 = 1.0 / (1.0 + w)  # share
     _27 = _26 * _26
-    _28 = _3 * _27
-    _29 = _12 + 0.5 * (p * _17) + 0.5 * (q * _6)
+    _28 = _3 * _27  # d share / d p
+    _29 = _12 + 0.5 * (p * _17) + 0.5 * (q * _6)  # d tilted / d p
     _30 = 0.5 * _21
-    _31 = _7 * _27
-    _32 = 0.5 * (p * _20) - (_2 - (0.5 * (q * _10)))
+    _31 = _7 * _27  # d share / d q
+    _32 = 0.5 * (p * _20) - (_2 - (0.5 * (q * _10)))  # d tilted / d q
     xd_x[0, 0] = 0.0
     xd_x[0, 1] = -_2
     xd_x[0, 2] = 0.5 * (h * _6)
@@ -95,20 +95,20 @@ def pose_wrench(x, w, force, wrench):
     """Write the wrench on wheel 1 that does the work of a force."""
     a, h, p, q, Q_a, Q_h, Q_p, Q_q = x[0], x[1], x[2], x[3], force[0], force[1], force[2], force[3]
     Q_1, Q_2 = force[4], force[5]
-    _0 = 1.0 / a
+    _0 = 1.0 / a  # d own / d ry
     _1 = h * _0
-    _2 = 1.0 / (1.0 + w)
+    _2 = 1.0 / (1.0 + w)  # share
     _3 = 1.0 + 2.0 * w
-    _4 = 0.5 * _1
-    _5 = 0.5 * (Q_p * (q * _1)) - (Q_q * (0.5 * w + 0.5 * (p * _1))) + Q_1 * (p - (0.5 * (_2 * (p * _3))) - _4) + Q_2 * (0.5 * (p * _2) - _4)
-    _6 = 0.5 * (a * Q_h) - (0.5 * (h * Q_a)) + 0.5 * (w * Q_p) + Q_1 * (q - (0.5 * (_2 * (q * _3)))) + 0.5 * (Q_2 * (q * _2))
+    _4 = 0.5 * _1  # d mz / d ox
+    _5 = 0.5 * (Q_p * (q * _1)) - (Q_q * (0.5 * w + 0.5 * (p * _1))) + Q_1 * (p - (0.5 * (_2 * (p * _3))) - _4) + Q_2 * (0.5 * (p * _2) - _4)  # wrench[3]
+    _6 = 0.5 * (a * Q_h) - (0.5 * (h * Q_a)) + 0.5 * (w * Q_p) + Q_1 * (q - (0.5 * (_2 * (q * _3)))) + 0.5 * (Q_2 * (q * _2))  # wrench[4]
     _7 = 1.0 / w
     _8 = q * _7
     _9 = p * _7
     _10 = _0 * (h * _9)
     _11 = 0.5 * (Q_a * (h * _8)) - (0.5 * (Q_h * (a * _8))) - (Q_p * (0.5 * (w * _8) + 0.5 * (q * _10))) + Q_q * (0.5 * (w * _9) + 0.5 * (p * _10))
     _12 = 0.5 * _10
-    _13 = 0.5 * (p * _9) + 0.5 * (q * _8)
+    _13 = 0.5 * (p * _9) + 0.5 * (q * _8)  # d tilted / d oz
     wrench[0] = -Q_a
     wrench[1] = Q_q * (p * _0) - (Q_p * (q * _0)) + Q_1 * _0 + Q_2 * _0
     wrench[2] = -Q_h
@@ -122,30 +122,30 @@ def pose_wrench_slopes(x, w, force, wrench_x):
     """Write its derivatives by a, h, p, q."""
     a, h, p, q, Q_a, Q_h, Q_p, Q_q = x[0], x[1], x[2], x[3], force[0], force[1], force[2], force[3]
     Q_1, Q_2 = force[4], force[5]
-    _0 = 1.0 / a
+    _0 = 1.0 / a  # d own / d ry
     _1 = _0 * _0
     _2 = h * _1
     _3 = 1.0 + 2.0 * w
     _4 = p * _3
     _5 = 1.0 / w
     _6 = p * _5
-    _7 = 1.0 / (1.0 + w)
+    _7 = 1.0 / (1.0 + w)  # share
     _8 = _7 * _7
-    _9 = _6 * _8
+    _9 = _6 * _8  # d share / d p
     _10 = p * _6
     _11 = h * _0
-    _12 = Q_1 * (1.0 - (0.5 * (_4 * _9 + _7 * (_3 - (2.0 * _10))))) - (Q_q * (0.5 * _11 - (0.5 * _6))) + 0.5 * (Q_2 * (_7 + p * _9))
+    _12 = Q_1 * (1.0 - (0.5 * (_4 * _9 + _7 * (_3 - (2.0 * _10))))) - (Q_q * (0.5 * _11 - (0.5 * _6))) + 0.5 * (Q_2 * (_7 + p * _9))  # d wrench[3] / d p
     _13 = q * _5
-    _14 = _13 * _8
-    _15 = 0.5 * (Q_p * _11) + 0.5 * (_13 * Q_q) - (0.5 * (Q_1 * (_4 * _14 - (2.0 * (_7 * (p * _13)))))) + 0.5 * (Q_2 * (p * _14))
+    _14 = _13 * _8  # d share / d q
+    _15 = 0.5 * (Q_p * _11) + 0.5 * (_13 * Q_q) - (0.5 * (Q_1 * (_4 * _14 - (2.0 * (_7 * (p * _13)))))) + 0.5 * (Q_2 * (p * _14))  # d wrench[3] / d q
     _16 = q * _3
     _17 = q * _13
-    _18 = Q_1 * (1.0 - (0.5 * (_16 * _14 + _7 * (_3 - (2.0 * _17))))) - (0.5 * (_13 * Q_p)) + 0.5 * (Q_2 * (_7 + q * _14))
+    _18 = Q_1 * (1.0 - (0.5 * (_16 * _14 + _7 * (_3 - (2.0 * _17))))) - (0.5 * (_13 * Q_p)) + 0.5 * (Q_2 * (_7 + q * _14))  # d wrench[4] / d q
     _19 = h * _6
     _20 = _1 * _19
-    _21 = 0.5 * (Q_p * (q * _20)) - (0.5 * (_13 * Q_h)) - (0.5 * (Q_q * (p * _20))) - (0.5 * (Q_1 * _20)) - (0.5 * (Q_2 * _20))
+    _21 = 0.5 * (Q_p * (q * _20)) - (0.5 * (_13 * Q_h)) - (0.5 * (Q_q * (p * _20))) - (0.5 * (Q_1 * _20)) - (0.5 * (Q_2 * _20))  # d wrench[5] / d a
     _22 = _6 * _0
-    _23 = 0.5 * (_13 * Q_a) - (0.5 * (Q_p * (q * _22))) + 0.5 * (Q_q * (p * _22)) + 0.5 * (Q_1 * _22) + 0.5 * (Q_2 * _22)
+    _23 = 0.5 * (_13 * Q_a) - (0.5 * (Q_p * (q * _22))) + 0.5 * (Q_q * (p * _22)) + 0.5 * (Q_1 * _22) + 0.5 * (Q_2 * _22)  # d wrench[5] / d h
     _24 = _5 * _5
     _25 = _6 * _24
     _26 = q * _25
@@ -155,16 +155,16 @@ def pose_wrench_slopes(x, w, force, wrench_x):
     _30 = _0 * _19
     _31 = 0.5 * (Q_a * (h * _26)) - (0.5 * (Q_h * (a * _26))) - (Q_p * (0.5 * (w * _26 - _27) + 0.5 * (q * _29))) + Q_q * (0.5 * (w * _28 - (_6 * _6)) + 0.5 * (_30 + p * _29))
     _32 = 0.5 * _29
-    _33 = 0.5 * _10 + 0.5 * _17
+    _33 = 0.5 * _10 + 0.5 * _17  # d tilted / d oz
     _34 = _3 * _33
-    _35 = 0.5 * (_6 + p * _28) + 0.5 * (q * _26)
+    _35 = 0.5 * (_6 + p * _28) + 0.5 * (q * _26)  # d (d tilted / d oz) / d p
     _36 = _13 * _24
     _37 = _5 + q * _36
     _38 = p * _36
     _39 = _0 * (h * _38)
     _40 = 0.5 * (Q_a * (h * _37)) - (0.5 * (Q_h * (a * _37))) - (Q_p * (0.5 * (w * _37 - (_13 * _13)) + 0.5 * (_30 + q * _39)))
     _41 = 0.5 * _39
-    _42 = 0.5 * (p * _38) + 0.5 * (_13 + q * _37)
+    _42 = 0.5 * (p * _38) + 0.5 * (_13 + q * _37)  # d (d tilted / d oz) / d q
     _43 = _40 + Q_q * (0.5 * (w * _38 - _27) + 0.5 * (p * _39)) + Q_1 * (_41 + _34 * _14 + _7 * (_3 * _42 - (2.0 * (_13 * _33))) - _13)
     wrench_x[0, 0] = 0.0
     wrench_x[0, 1] = 0.0
@@ -198,16 +198,16 @@ def pose_columns(x, w, columns, turn):
     a, h, p, q = x[0], x[1], x[2], x[3]
     _0 = 1.0 / w
     _1 = q * _0
-    _2 = 1.0 / a
+    _2 = 1.0 / a  # d own / d ry
     _3 = h * _2
-    _4 = 0.5 * w
+    _4 = 0.5 * w  # d x[2] / d oy
     _5 = p * _0
     _6 = _2 * (h * _5)
-    _7 = 1.0 / (1.0 + w)
+    _7 = 1.0 / (1.0 + w)  # share
     _8 = 1.0 + 2.0 * w
-    _9 = 0.5 * _3
+    _9 = 0.5 * _3  # d mz / d ox
     _10 = 0.5 * _6
-    _11 = 0.5 * (p * _5) + 0.5 * (q * _1)
+    _11 = 0.5 * (p * _5) + 0.5 * (q * _1)  # d tilted / d oz
     columns[0, 0] = -1.0
     columns[0, 1] = 0.0
     columns[0, 2] = 0.0
@@ -267,22 +267,22 @@ def pose_columns(x, w, columns, turn):
 @njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
 def end_value(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other):
     """Return where an end face cuts the path of contact."""
-    _0 = i_w * (width - (sign * (p * (base * ca + sa * sig) + q * (ca * sig - (base * sa)))) - (other * (a * p))) - (0.5 * (h * sign))
+    _0 = i_w * (width - (sign * (p * (base * ca + sa * sig) + q * (ca * sig - (base * sa)))) - (other * (a * p))) - (0.5 * (h * sign))  # limit
     return _0
 
 
 @njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
 def end_slopes(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other, mate, total, difference, length, i_w3, grad):
     """Write its gradient by the pose."""
-    _0 = total * (1.0 / (a * length))
-    _1 = ca * _0
+    _0 = total * (1.0 / (a * length))  # turned
+    _1 = ca * _0  # d sa / d a
     _2 = a * (1.0 / length) + difference * _0
     _3 = sa * _0
     _4 = sign * (p * (sig * _1 + 0.5 * (sa * _2) - (base * _3)) + q * (0.5 * (ca * _2) - (sig * _3) - (base * _1))) + p * other
     _5 = base * ca
-    _6 = _5 + sa * sig
+    _6 = _5 + sa * sig  # x
     _7 = base * sa
-    _8 = ca * sig - _7
+    _8 = ca * sig - _7  # y
     _9 = width - (sign * (p * _6 + q * _8)) - (other * (a * p))
     grad[0] = -(i_w * _4)
     grad[1] = -(0.5 * sign)
@@ -296,10 +296,10 @@ def end_slopes(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other, mate, tot
 def end_curves(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other, mate, total, difference, length, i_w3, i_w5, hess):
     """Write the upper half of its Hessian."""
     _0 = 1.0 / (a * length)
-    _1 = total * _0
-    _2 = ca * _1
+    _1 = total * _0  # turned
+    _2 = ca * _1  # d sa / d a
     _3 = 1.0 / length
-    _4 = a * _3
+    _4 = a * _3  # d length / d a
     _5 = _4 + difference * _1
     _6 = _2 * _5
     _7 = sa * _1
@@ -309,17 +309,17 @@ def end_curves(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other, mate, tot
     _11 = _1 * _2 - (sa * _8)
     _12 = _7 * _5
     _13 = p * (0.5 * _6 - (sig * _9) + 0.5 * (_6 + sa * _10) - (base * _11)) + q * (0.5 * (ca * _10 - _12) - (0.5 * _12 + sig * _11) + base * _9)
-    _14 = p * i_w3
+    _14 = p * i_w3  # d i_w / d p
     _15 = base * _7
-    _16 = sig * _2 + 0.5 * (sa * _5) - _15
+    _16 = sig * _2 + 0.5 * (sa * _5) - _15  # d x / d a
     _17 = base * _2
-    _18 = 0.5 * (ca * _5) - (sig * _7) - _17
+    _18 = 0.5 * (ca * _5) - (sig * _7) - _17  # d y / d a
     _19 = sign * (p * _16 + q * _18) + p * other
-    _20 = q * i_w3
+    _20 = q * i_w3  # d i_w / d q
     _21 = base * ca
-    _22 = _21 + sa * sig
+    _22 = _21 + sa * sig  # x
     _23 = base * sa
-    _24 = ca * sig - _23
+    _24 = ca * sig - _23  # y
     _25 = width - (sign * (p * _22 + q * _24)) - (other * (a * p))
     _26 = sign * _22 + a * other
     _27 = _14 * _26

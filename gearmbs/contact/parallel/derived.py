@@ -12,19 +12,19 @@ from gearmbs.kernels.jit import njit
 def corner_1(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radius, rounding, contact):
     """Write the contact of a tip corner of wheel 1 on an involute."""
     _0 = a * sin
-    _1 = radius * (sin * cos_eta + cos * sin_eta)
-    _2 = rounding + _1
-    _3 = base * (alpha + start)
+    _1 = radius * (sin * cos_eta + cos * sin_eta)  # d still / d eta
+    _2 = rounding + _1  # own
+    _3 = base * (alpha + start)  # mate
     _4 = _0 - _2 - _3
-    _5 = _3 + 0.5 * _4 - tip
+    _5 = _3 + 0.5 * _4 - tip  # over
     _6 = bend * _5
-    _7 = _4 + 0.5 * (_5 * _6)
+    _7 = _4 + 0.5 * (_5 * _6)  # gap
     _8 = 1.0 / (_1 - _0)
-    _9 = radius * (cos * cos_eta - (sin * sin_eta))
-    _10 = a * cos - _9 - base
-    _11 = base + 0.5 * _10
-    _12 = _10 + 0.5 * (_6 * _11 + _5 * (bend * _11))
-    _13 = base - (0.5 * base)
+    _9 = radius * (cos * cos_eta - (sin * sin_eta))  # d own / d alpha
+    _10 = a * cos - _9 - base  # still
+    _11 = base + 0.5 * _10  # d over / d alpha
+    _12 = _10 + 0.5 * (_6 * _11 + _5 * (bend * _11))  # d gap / d alpha
+    _13 = base - (0.5 * base)  # d over / d start
     contact[0] = _7
     contact[1] = sin + 0.5 * (0.5 * (sin * _6) + 0.5 * (_5 * (sin * bend))) - (cos * _8 * _12)
     contact[2] = -(_9 + 0.5 * (0.5 * (_9 * _6) + 0.5 * (_5 * (bend * _9))) + _1 * _8 * _12)
@@ -37,40 +37,40 @@ def corner_1(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radiu
 @njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def corner_1_slopes(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radius, rounding, contact):
     """Write the derivatives of the contact of a tip corner of wheel 1 on an involute."""
-    _0 = radius * (sin * cos_eta + cos * sin_eta)
+    _0 = radius * (sin * cos_eta + cos * sin_eta)  # d still / d eta
     _1 = a * sin
-    _2 = _0 - _1
+    _2 = _0 - _1  # d still / d alpha
     _3 = 1.0 / _2
     _4 = _0 * _3
-    _5 = radius * (cos * cos_eta - (sin * sin_eta))
+    _5 = radius * (cos * cos_eta - (sin * sin_eta))  # d own / d alpha
     _6 = bend * _5
     _7 = sin * bend
     _8 = cos * _3
-    _9 = base * (alpha + start)
-    _10 = _9 + 0.5 * (_1 - (rounding + _0) - _9) - tip
+    _9 = base * (alpha + start)  # mate
+    _10 = _9 + 0.5 * (_1 - (rounding + _0) - _9) - tip  # over
     _11 = bend * _10
     _12 = _0 * _11
     _13 = a * cos
-    _14 = _13 - _5 - base
-    _15 = base + 0.5 * _14
+    _14 = _13 - _5 - base  # still
+    _15 = base + 0.5 * _14  # d over / d alpha
     _16 = _15 * _6
     _17 = _10 * (bend * _0)
     _18 = bend * _15
     _19 = _5 * _18
-    _20 = _0 + 0.5 * (0.5 * _12 - (0.5 * _16) + 0.5 * _17 - (0.5 * _19))
-    _21 = _14 + 0.5 * (_11 * _15 + _10 * _18)
+    _20 = _0 + 0.5 * (0.5 * _12 - (0.5 * _16) + 0.5 * _17 - (0.5 * _19))  # d (d gap / d alpha) / d eta
+    _21 = _14 + 0.5 * (_11 * _15 + _10 * _18)  # d gap / d alpha
     _22 = _3 * _3
     _23 = _5 * _22
     _24 = _15 * _18
-    _25 = _2 + 0.5 * (_24 + 0.5 * (_2 * _11) + _24 + 0.5 * (_10 * (bend * _2)))
+    _25 = _2 + 0.5 * (_24 + 0.5 * (_2 * _11) + _24 + 0.5 * (_10 * (bend * _2)))  # d (d gap / d alpha) / d alpha
     _26 = _22 * (_5 - _13)
-    _27 = cos + 0.5 * (0.5 * (cos * _11 + sin * _18) + 0.5 * (_7 * _15 + _10 * (cos * bend))) - (_8 * _25 - (_21 * (sin * _3 + cos * _26)))
-    _28 = base - (0.5 * base)
+    _27 = cos + 0.5 * (0.5 * (cos * _11 + sin * _18) + 0.5 * (_7 * _15 + _10 * (cos * bend))) - (_8 * _25 - (_21 * (sin * _3 + cos * _26)))  # d by_a / d alpha
+    _28 = base - (0.5 * base)  # d over / d start
     _29 = bend * _28
     _30 = _15 * _29 + _18 * _28
     _31 = _5 * _3
     _32 = 0.5 * (_5 * _6)
-    _33 = _4 * (0.5 * (0.5 * (_19 - _12) + 0.5 * (_16 - _17)) - _0 + _21 * (_31 - (_0 * _26)) + _4 * _25) - (_21 * (_31 - (_0 * _23)) + _4 * _20 - (_0 + 0.5 * (0.5 * (_12 + _32) + 0.5 * (_17 + _32))))
+    _33 = _4 * (0.5 * (0.5 * (_19 - _12) + 0.5 * (_16 - _17)) - _0 + _21 * (_31 - (_0 * _26)) + _4 * _25) - (_21 * (_31 - (_0 * _23)) + _4 * _20 - (_0 + 0.5 * (0.5 * (_12 + _32) + 0.5 * (_17 + _32))))  # bends[4]
     contact[7] = -_4
     contact[8] = 0.0
     contact[9] = -(0.5 * (0.25 * (sin * _6) + 0.25 * (_5 * _7)) + _8 * _20 - (_21 * (cos * _23)) + _4 * _27)
@@ -87,18 +87,18 @@ def corner_1_slopes(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta
 def corner_2(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radius, rounding, contact):
     """Write the contact of a tip corner of wheel 2 on an involute."""
     _0 = a * sin
-    _1 = radius * (sin * cos_eta + cos * sin_eta)
-    _2 = base * (alpha + start)
+    _1 = radius * (sin * cos_eta + cos * sin_eta)  # d still / d eta
+    _2 = base * (alpha + start)  # mate
     _3 = _0 - (rounding + _1) - _2
-    _4 = _2 + 0.5 * _3 - tip
+    _4 = _2 + 0.5 * _3 - tip  # over
     _5 = bend * _4
-    _6 = _3 + 0.5 * (_4 * _5)
+    _6 = _3 + 0.5 * (_4 * _5)  # gap
     _7 = 1.0 / (_1 - _0)
-    _8 = radius * (cos * cos_eta - (sin * sin_eta))
-    _9 = a * cos - _8 - base
-    _10 = base + 0.5 * _9
-    _11 = _9 + 0.5 * (_5 * _10 + _4 * (bend * _10))
-    _12 = base - (0.5 * base)
+    _8 = radius * (cos * cos_eta - (sin * sin_eta))  # d own / d alpha
+    _9 = a * cos - _8 - base  # still
+    _10 = base + 0.5 * _9  # d over / d alpha
+    _11 = _9 + 0.5 * (_5 * _10 + _4 * (bend * _10))  # d gap / d alpha
+    _12 = base - (0.5 * base)  # d over / d start
     contact[0] = _6
     contact[1] = sin + 0.5 * (0.5 * (sin * _5) + 0.5 * (_4 * (sin * bend))) - (cos * _7 * _11)
     contact[2] = 0.5 * (_5 * _12 + _4 * (bend * _12)) - base
@@ -111,40 +111,40 @@ def corner_2(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radiu
 @njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def corner_2_slopes(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta, radius, rounding, contact):
     """Write the derivatives of the contact of a tip corner of wheel 2 on an involute."""
-    _0 = radius * (sin * cos_eta + cos * sin_eta)
+    _0 = radius * (sin * cos_eta + cos * sin_eta)  # d still / d eta
     _1 = a * sin
-    _2 = _0 - _1
+    _2 = _0 - _1  # d still / d alpha
     _3 = 1.0 / _2
     _4 = _0 * _3
-    _5 = base - (0.5 * base)
+    _5 = base - (0.5 * base)  # d over / d start
     _6 = bend * _5
     _7 = sin * bend
     _8 = cos * _3
     _9 = a * cos
-    _10 = radius * (cos * cos_eta - (sin * sin_eta))
-    _11 = _9 - _10 - base
-    _12 = base + 0.5 * _11
+    _10 = radius * (cos * cos_eta - (sin * sin_eta))  # d own / d alpha
+    _11 = _9 - _10 - base  # still
+    _12 = base + 0.5 * _11  # d over / d alpha
     _13 = bend * _12
     _14 = _12 * _6 + _13 * _5
     _15 = bend * _10
-    _16 = base * (alpha + start)
-    _17 = _16 + 0.5 * (_1 - (rounding + _0) - _16) - tip
+    _16 = base * (alpha + start)  # mate
+    _17 = _16 + 0.5 * (_1 - (rounding + _0) - _16) - tip  # over
     _18 = bend * _17
     _19 = _0 * _18
     _20 = _12 * _15
     _21 = _17 * (bend * _0)
     _22 = _10 * _13
-    _23 = _0 + 0.5 * (0.5 * _19 - (0.5 * _20) + 0.5 * _21 - (0.5 * _22))
-    _24 = _11 + 0.5 * (_18 * _12 + _17 * _13)
+    _23 = _0 + 0.5 * (0.5 * _19 - (0.5 * _20) + 0.5 * _21 - (0.5 * _22))  # d (d gap / d alpha) / d eta
+    _24 = _11 + 0.5 * (_18 * _12 + _17 * _13)  # d gap / d alpha
     _25 = _3 * _3
     _26 = _10 * _25
     _27 = _12 * _13
-    _28 = _2 + 0.5 * (_27 + 0.5 * (_2 * _18) + _27 + 0.5 * (_17 * (bend * _2)))
+    _28 = _2 + 0.5 * (_27 + 0.5 * (_2 * _18) + _27 + 0.5 * (_17 * (bend * _2)))  # d (d gap / d alpha) / d alpha
     _29 = _25 * (_10 - _9)
-    _30 = cos + 0.5 * (0.5 * (cos * _18 + sin * _13) + 0.5 * (_7 * _12 + _17 * (cos * bend))) - (_8 * _28 - (_24 * (sin * _3 + cos * _29)))
+    _30 = cos + 0.5 * (0.5 * (cos * _18 + sin * _13) + 0.5 * (_7 * _12 + _17 * (cos * bend))) - (_8 * _28 - (_24 * (sin * _3 + cos * _29)))  # d by_a / d alpha
     _31 = _10 * _3
     _32 = 0.5 * (_10 * _15)
-    _33 = _4 * (0.5 * (0.5 * (_22 - _19) + 0.5 * (_20 - _21)) - _0 + _24 * (_31 - (_0 * _29)) + _4 * _28) - (_24 * (_31 - (_0 * _26)) + _4 * _23 - (_0 + 0.5 * (0.5 * (_19 + _32) + 0.5 * (_21 + _32))))
+    _33 = _4 * (0.5 * (0.5 * (_22 - _19) + 0.5 * (_20 - _21)) - _0 + _24 * (_31 - (_0 * _29)) + _4 * _28) - (_24 * (_31 - (_0 * _26)) + _4 * _23 - (_0 + 0.5 * (0.5 * (_19 + _32) + 0.5 * (_21 + _32))))  # bends[7]
     contact[7] = 0.0
     contact[8] = -_4
     contact[9] = 0.5 * (0.5 * (sin * _6) + 0.5 * (_7 * _5)) - (0.5 * (_8 * _14))
@@ -160,17 +160,17 @@ def corner_2_slopes(a, alpha, sin, cos, start, base, tip, bend, sin_eta, cos_eta
 @njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plane_1(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta, radius, rounding, contact):
     """Write the contact of a tip corner of wheel 1 on a plane."""
-    _0 = cos_eta * radius
+    _0 = cos_eta * radius  # d (d x / d eta) / d eta
     _1 = cos_turn * base + sin_turn * beside
-    _2 = a - _0 - _1
-    _3 = sin_eta * radius
+    _2 = a - _0 - _1  # x
+    _3 = sin_eta * radius  # d x / d eta
     _4 = sin_turn * base
     _5 = cos_turn * beside
     _6 = _3 + _4 - _5
-    _7 = np.sqrt(_2 * _2 + _6 * _6)
-    _8 = _7 - plane - rounding
+    _7 = np.sqrt(_2 * _2 + _6 * _6)  # distance
+    _8 = _7 - plane - rounding  # gap
     _9 = 1.0 / _7
-    _10 = _2 * _9
+    _10 = _2 * _9  # by_a
     _11 = _6 * _9
     contact[0] = _8
     contact[1] = _10
@@ -184,27 +184,27 @@ def plane_1(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta
 @njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plane_1_slopes(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta, radius, rounding, contact):
     """Write the derivatives of the contact of a tip corner of wheel 1 on a plane."""
-    _0 = sin_eta * radius
-    _1 = cos_eta * radius
+    _0 = sin_eta * radius  # d x / d eta
+    _1 = cos_eta * radius  # d (d x / d eta) / d eta
     _2 = cos_turn * base + sin_turn * beside
-    _3 = a - _1 - _2
+    _3 = a - _1 - _2  # x
     _4 = sin_turn * base
     _5 = cos_turn * beside
     _6 = _0 + _4 - _5
     _7 = 1.0 / np.sqrt(_3 * _3 + _6 * _6)
-    _8 = _3 * _7
+    _8 = _3 * _7  # by_a
     _9 = _6 * _7
-    _10 = _0 * _8 + _1 * _9
+    _10 = _0 * _8 + _1 * _9  # by_1
     _11 = _7 * _7
     _12 = _10 * _11
-    _13 = _0 * _7 - (_3 * _12)
+    _13 = _0 * _7 - (_3 * _12)  # d by_a / d eta
     _14 = _5 - _4
-    _15 = _2 * _9 - (_8 * _14)
+    _15 = _2 * _9 - (_8 * _14)  # by_2
     _16 = _15 * _11
     _17 = _7 * _14 + _3 * _16
     _18 = _1 * _7 - (_6 * _12)
     _19 = _2 * _7 - (_6 * _16)
-    _20 = radius * (cos_turn * cos_eta + sin_turn * sin_eta)
+    _20 = radius * (cos_turn * cos_eta + sin_turn * sin_eta)  # d own / d eta
     contact[7] = 0.0
     contact[8] = -1.0
     contact[9] = _13
@@ -220,17 +220,17 @@ def plane_1_slopes(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, 
 @njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plane_2(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta, radius, rounding, contact):
     """Write the contact of a tip corner of wheel 2 on a plane."""
-    _0 = cos_eta * radius
+    _0 = cos_eta * radius  # d (d x / d eta) / d eta
     _1 = cos_turn * base + sin_turn * beside
-    _2 = a - _0 - _1
-    _3 = sin_eta * radius
+    _2 = a - _0 - _1  # x
+    _3 = sin_eta * radius  # d x / d eta
     _4 = sin_turn * base
     _5 = cos_turn * beside
     _6 = _3 + _4 - _5
-    _7 = np.sqrt(_2 * _2 + _6 * _6)
-    _8 = _7 - plane - rounding
+    _7 = np.sqrt(_2 * _2 + _6 * _6)  # distance
+    _8 = _7 - plane - rounding  # gap
     _9 = 1.0 / _7
-    _10 = _2 * _9
+    _10 = _2 * _9  # by_a
     _11 = _6 * _9
     contact[0] = _8
     contact[1] = _10
@@ -244,24 +244,24 @@ def plane_2(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta
 @njit(cache=True, straight=True, error_model="numpy", forceinline=True)
 def plane_2_slopes(a, sin_turn, cos_turn, base, beside, before, plane, sin_eta, cos_eta, radius, rounding, contact):
     """Write the derivatives of the contact of a tip corner of wheel 2 on a plane."""
-    _0 = cos_eta * radius
+    _0 = cos_eta * radius  # d (d x / d eta) / d eta
     _1 = cos_turn * base + sin_turn * beside
-    _2 = a - _0 - _1
-    _3 = sin_eta * radius
+    _2 = a - _0 - _1  # x
+    _3 = sin_eta * radius  # d x / d eta
     _4 = sin_turn * base
     _5 = cos_turn * beside
     _6 = _3 + _4 - _5
     _7 = 1.0 / np.sqrt(_2 * _2 + _6 * _6)
     _8 = _5 - _4
     _9 = _6 * _7
-    _10 = _2 * _7
-    _11 = _1 * _9 - (_10 * _8)
+    _10 = _2 * _7  # by_a
+    _11 = _1 * _9 - (_10 * _8)  # by_1
     _12 = _7 * _7
     _13 = _11 * _12
     _14 = _7 * _8 + _2 * _13
-    _15 = _3 * _10 + _0 * _9
+    _15 = _3 * _10 + _0 * _9  # by_2
     _16 = _15 * _12
-    _17 = _3 * _7 - (_2 * _16)
+    _17 = _3 * _7 - (_2 * _16)  # d by_a / d eta
     _18 = _1 * _7 - (_6 * _13)
     _19 = _0 * _7 - (_6 * _16)
     contact[7] = -1.0
@@ -287,7 +287,7 @@ def contact_rates(a, rate_1, rate_2, contact):
 def contact_wrench(a, force, ratio, rate_1, rate_2, contact, sums):
     """Add the wrench of a contact."""
     by_a, by_1, by_2, sin, cos, normal = contact[1], contact[2], contact[3], contact[4], contact[5], contact[6]
-    _0 = (rate_2 * (a * sin) + normal * (rate_1 - rate_2)) * (force * ratio)
+    _0 = (rate_2 * (a * sin) + normal * (rate_1 - rate_2)) * (force * ratio)  # friction
     sums[0] += cos * _0 - (force * by_a)
     sums[1] += (force * (by_1 + by_2)) * (1.0 / a) - (sin * _0)
     sums[2] += force * by_1 - (normal * _0)
@@ -299,24 +299,24 @@ def contact_slopes(a, force, stiffness, damping, ratio, ratio_slope, rate_1, rat
     by_a, by_1, by_2, sin, cos, normal, alpha_1, alpha_2 = contact[1], contact[2], contact[3], contact[4], contact[5], contact[6], contact[7], contact[8]
     by_a_1, by_a_2, by_1_1, by_1_2, by_2_1, by_2_2, normal_1, normal_2 = contact[9], contact[10], contact[11], contact[12], contact[13], contact[14], contact[15], contact[16]
     _0 = force * ratio
-    _1 = cos * alpha_1
+    _1 = cos * alpha_1  # d sin / d phi_1
     _2 = rate_1 - rate_2
     _3 = rate_2 * (a * _1) + normal_1 * _2
     _4 = a * sin
     _5 = rate_2 * _4 + normal * _2
     _6 = ratio_slope * _5
     _7 = stiffness * by_1 + damping * (rate_1 * by_1_1 + rate_2 * by_2_1)
-    _8 = _0 * _3 + _5 * (force * (_6 * _3) - (ratio * _7))
-    _9 = _5 * _0
-    _10 = cos * alpha_2
+    _8 = _0 * _3 + _5 * (force * (_6 * _3) - (ratio * _7))  # d friction / d phi_1
+    _9 = _5 * _0  # friction
+    _10 = cos * alpha_2  # d sin / d phi_2
     _11 = rate_2 * (a * _10) + normal_2 * _2
     _12 = stiffness * by_2 + damping * (rate_1 * by_1_2 + rate_2 * by_2_2)
-    _13 = _0 * _11 + _5 * (force * (_6 * _11) - (ratio * _12))
+    _13 = _0 * _11 + _5 * (force * (_6 * _11) - (ratio * _12))  # d friction / d phi_2
     _14 = damping * by_1
-    _15 = normal * _0 + _5 * (force * (normal * _6) - (ratio * _14))
+    _15 = normal * _0 + _5 * (force * (normal * _6) - (ratio * _14))  # d friction / d rate_1
     _16 = _4 - normal
     _17 = damping * by_2
-    _18 = _0 * _16 + _5 * (force * (_6 * _16) - (ratio * _17))
+    _18 = _0 * _16 + _5 * (force * (_6 * _16) - (ratio * _17))  # d friction / d rate_2
     _19 = 1.0 / a
     _20 = by_1 + by_2
     sums[3] += cos * _8 - (_9 * (sin * alpha_1)) - (force * by_a_1 - (by_a * _7))
