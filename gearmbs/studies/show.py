@@ -82,11 +82,7 @@ def case_plot(case: Case, *, title: str | None = None) -> Figure:
 
 
 def _speed(case: Case, t: np.ndarray) -> np.ndarray:
-    from gearmbs.studies.case.drive import drive_angle
-
-    o = case.operation
-    angle = drive_angle(o.speed, o.run_up, o.run_up + o.settling)
-    return np.array([angle.derivatives(at)[1] for at in t]) * 30.0 / math.pi
+    return np.array([case.driver_angle.derivatives(at)[1] for at in t]) * 30.0 / math.pi
 
 
 def _torque(case: Case, t: np.ndarray) -> np.ndarray:

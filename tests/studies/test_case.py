@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gearmbs.schema.quantities import counts
 from gearmbs.studies import Case, CaseError, load_case, make_case, paper_cases
 from gearmbs.studies.case import case as case_module
-from gearmbs.studies.case.section import CaseWarning
+from gearmbs.studies.case.section import CaseWarning, sections_of
 from gearmbs.studies.case.sections import Gears, Operation
 from tests.generators import cases, seed
 from tests.says import says
@@ -385,3 +386,23 @@ def test_a_changed_case_keeps_what_does_not_change():
     assert "[gears]" not in case_module.case_toml(other)
     with pytest.raises(CaseError, match=r"operation.torque = '70 m'"):
         case.changed(operation={"torque": "70 m"})
+
+
+def test_a_section_that_has_been_changed_unchecked_is_checked_again():
+    gears = Case().gears.model_copy(update={"tip_radius": (0.001, 0.001)})
+    with pytest.raises(CaseError, match=says("gears.tip_radius", "1.0000 mm", "[driver, driven]")):
+        Case(gears=gears)
+
+
+COUNTING = [
+    (section, name)
+    for section, kind in sections_of(Case).items()
+    for name, field in kind.model_fields.items()
+    if counts(field.annotation)
+]
+
+
+@pytest.mark.parametrize(("section", "name"), COUNTING)
+def test_true_is_no_number_of_any_field(section, name):
+    with pytest.raises(CaseError, match=says(f"{section}.{name}", "True", "give")):
+        Case(**{section: {name: True}})

@@ -170,13 +170,10 @@ def rotation_of(plan: Plan, thing: Any, mesh: str, sensor: str | None, name: str
     if mesh:
         return _of_train(plan, thing, mesh, sensor, name)
     if isinstance(plan.subject, PairSubject):
-        from gearmbs.studies.case.drive import drive_angle
-
         operation = thing.operation
         begin = operation.run_up + operation.settling
         speed, torque = (x if isinstance(x, float) else np.nan for x in (operation.speed, operation.torque))
-        angle = drive_angle(operation.speed, operation.run_up, begin)
-        return Rotation(speed, torque, operation.top_speed, tuple(thing.gears.teeth), 1.0, begin, angle)
+        return Rotation(speed, torque, operation.top_speed, tuple(thing.gears.teeth), 1.0, begin, thing.driver_angle)
     # somebody's own subject: its records begin where it turns at full speed
     try:
         given, teeth = thing["operation"], thing["gears"]["teeth"]

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from gearmbs.gears import GearPair
+    from gearmbs.mechanism import TimeFunction
     from gearmbs.studies.case.keywords import (
         ContactKeywords,
         FaultKeywords,
@@ -230,16 +231,21 @@ class Case(Section, Shown):
             changes["solver"] = {"lump": True}
         return self.changed(**changes) if changes else self
 
+    @cached_property
+    def driver_angle(self) -> TimeFunction:
+        """Angle of the driver over time from rest, rad."""
+        from gearmbs.studies.case.drive import drive_angle
+
+        operation = self.operation
+        return drive_angle(operation.speed, operation.run_up, operation.run_up + operation.settling)
+
     @property
     def angle_turned(self) -> float:
         """Angle that the driver turns during the record, rad."""
         operation = self.operation
         if operation.speed_curve is None:
             return operation.top_speed * operation.longest
-        from gearmbs.studies.case.drive import drive_angle
-
-        start = operation.run_up + operation.settling
-        angle = drive_angle(operation.speed, operation.run_up, start)
+        start, angle = operation.run_up + operation.settling, self.driver_angle
         return angle(start + operation.longest) - angle(start)
 
     @cached_property

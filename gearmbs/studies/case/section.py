@@ -11,10 +11,10 @@ from numbers import Real
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, model_validator
 
 from gearmbs.schema.described import OWN, faults, path_of, remedy
-from gearmbs.schema.quantities import Measure, counts, no_truth
+from gearmbs.schema.quantities import Measure, no_truth
 from gearmbs.units import NUMBER
 from gearmbs.wording import did_you_mean, warn
 
@@ -52,6 +52,9 @@ Settling = Annotated[float, Measure("time", 0, 1000)]
 Duration = Annotated[float | Literal["auto"], Measure("time", 1e-5, 10000, word="auto")]
 SamplingRate = Annotated[float | None, Measure("frequency", 1, 1e7)]
 SlidingSpeed = Annotated[float, Measure("speed", 1e-6, 1000)]
+
+NO_TRUTH = BeforeValidator(no_truth)
+"""Of fields with numbers that measure nothing: pydantic takes true and false for 1 and 0."""
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -143,22 +146,15 @@ class Section(BaseModel, metaclass=_OneError):
             raise CaseError(f"{self.section or 'case'}.{name}: {_unknown((name,), type(self))}")
         super().__setattr__(name, value)
 
-    @field_validator("*", mode="before")
-    @classmethod
-    def _number(cls, value: Any, info: Any) -> Any:
-        """Refuse true and false where a number is meant."""
-        if not isinstance(value, (bool, list, tuple)):
-            return value
-        field = cls.model_fields[info.field_name]
-        if counts(field.annotation) and not any(isinstance(item, Measure) for item in field.metadata):
-            return no_truth(value)
-        return value
-
     @model_validator(mode="wrap")
     @classmethod
     def _remember(cls, data: Any, handler: Any) -> Any:
         """Keep what the user wrote of quantities, and remark plain numbers that look like another unit."""
+        if type(data) is cls and "checked" in vars(data):
+            # a section taken over from another case, which does not change
+            return data
         made = handler(data)
+        made.__dict__["checked"] = True
         if isinstance(data, dict):
             measures = measures_of(cls)
             made.__dict__["given"] = {k: v for k, v in data.items() if k in measures and _has_text(v)}

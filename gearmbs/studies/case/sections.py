@@ -72,7 +72,7 @@ class Gears(Section):
 
     section: ClassVar[str] = "gears"
 
-    teeth: Annotated[tuple[int, int], BeforeValidator(_both)] = (29, 29)
+    teeth: Annotated[tuple[int, int], BeforeValidator(_both), q.NO_TRUTH] = (29, 29)
     module: q.Module = 95e-3 / 31
     pressure_angle: q.PressureAngle = Field(default=0.3490658503988659)
     face_width: q.FaceWidth = 0.020
@@ -81,7 +81,7 @@ class Gears(Section):
     tip_radius: q.WheelRadius = None
     root_radius: q.WheelRadius = None
     fillet_radius: q.ToothLength = None
-    profile_shift: Annotated[tuple[float, float], BeforeValidator(_both)] = (0.0, 0.0)
+    profile_shift: Annotated[tuple[float, float], BeforeValidator(_both), q.NO_TRUTH] = (0.0, 0.0)
     bore_radius: q.BoreRadius = 0.0
     tip_rounding: q.TipRounding = 0.0
     density: q.WheelDensity = 7850.0
@@ -188,7 +188,7 @@ class Shafts(Section):
     radius: q.ShaftRadius = 0.015
     length: q.ShaftLength = 0.200
     density: q.Density = 7850.0
-    modes: Annotated[int | Literal["all"] | None, BeforeValidator(_modes)] = None
+    modes: Annotated[int | Literal["all"] | None, BeforeValidator(_modes), q.NO_TRUTH] = None
     bearings: Annotated[tuple[str, str] | None, BeforeValidator(_designations)] = None
     bearing_distance: q.BearingDistance = None
 
@@ -345,11 +345,11 @@ class Contact(Section):
 
     section: ClassVar[str] = "contact"
 
-    stiffness: float | str = "2.9852e5 N/mm^1.3"
-    exponent: float = Field(default=1.3, ge=1.0)
-    damping: float | str = "298.52 N s/mm"
+    stiffness: Annotated[float | str, q.NO_TRUTH] = "2.9852e5 N/mm^1.3"
+    exponent: Annotated[float, q.NO_TRUTH] = Field(default=1.3, ge=1.0)
+    damping: Annotated[float | str, q.NO_TRUTH] = "298.52 N s/mm"
     depth: q.Depth = 0.0001
-    slices: int | None = Field(default=None, ge=1)
+    slices: Annotated[int | None, q.NO_TRUTH] = Field(default=None, ge=1)
 
     if TYPE_CHECKING:
 
@@ -382,8 +382,8 @@ class FrictionSettings(Section):
     section: ClassVar[str] = "friction"
 
     enabled: Annotated[bool, BeforeValidator(flag)] = True
-    static: float = Field(default=0.1, ge=0)
-    dynamic: float = Field(default=0.05, ge=0)
+    static: Annotated[float, q.NO_TRUTH] = Field(default=0.1, ge=0)
+    dynamic: Annotated[float, q.NO_TRUTH] = Field(default=0.05, ge=0)
     static_speed: q.SlidingSpeed = 0.1
     dynamic_speed: q.SlidingSpeed = 1.0
 
@@ -426,7 +426,7 @@ class Solver(Section):
 
     integrator: Annotated[IntegratorName, BeforeValidator(_upper)] = DEFAULT
     formulation: Annotated[FormulationName, BeforeValidator(_upper)] = "SI2"
-    tolerance: float | None = None
+    tolerance: Annotated[float | None, q.NO_TRUTH] = None
     output_rate: q.SamplingRate = None
     signal_rate: q.SamplingRate = None
     lump: Annotated[bool | None, BeforeValidator(_flag_or_none)] = None

@@ -22,7 +22,6 @@ from gearmbs.signals.filters import apply_zero_phase, decimation_taps
 from gearmbs.signals.resampling import monotone_cubic
 from gearmbs.signals.signal.signal import check_finite, check_rate, check_speed, check_teeth
 from gearmbs.studies.case.case import Case, CaseError
-from gearmbs.studies.case.drive import drive_angle
 from gearmbs.studies.case.limits import remarks
 from gearmbs.studies.case.sections import units_of_fields
 from gearmbs.studies.run.levels import LEVELS, level_parts, levels_of, tracked_levels
@@ -335,9 +334,9 @@ def teeth_in_mesh(case: Case, time: float) -> list[float]:
     the mesh: pi from the driven wheel, and from a driver inside a ring, else 0. A step is what the number changes by
     for each pitch that passes, 1 or -1; wheels turn against each other unless one is a ring.
     """
-    operation, pair = case.operation, case.pair()
+    pair = case.pair()
     sense = pair.operating_point.rotation
-    driver = drive_angle(operation.speed, operation.run_up, operation.run_up + operation.settling, sense)(time)
+    driver = sense * case.driver_angle(time)
     teeth, external = case.gears.teeth, pair.geometry.sign > 0
     driven = pair.driven_angle(0.0) - (1 if external else -1) * driver * teeth[0] / teeth[1]
     out = [float(time)]
@@ -351,10 +350,8 @@ def teeth_in_mesh(case: Case, time: float) -> list[float]:
 
 def _turning(case: Case, t: np.ndarray) -> dict[str, Any]:
     """Return speed and angle of the driver over the times of a signal, as prescribed."""
-    operation = case.operation
-    start = operation.run_up + operation.settling
-    function = drive_angle(operation.speed, operation.run_up, start)
-    begin = function(start)
+    operation, function = case.operation, case.driver_angle
+    begin = function(operation.run_up + operation.settling)
     angle, speed, _ = np.array([function.derivatives(at) for at in t]).T
     return {
         "speed": ("signal_time", speed, {"units": "rad/s", "long_name": "speed of the driver"}),
@@ -429,10 +426,8 @@ def cost(case: Case, solution: Solution) -> dict[str, Any]:
 
     The first falls with the speed of the wheels, the second hardly does.
     """
-    operation = case.operation
     end, spent = float(solution.t[-1]), solution.stats.wall_time
-    angle = drive_angle(operation.speed, operation.run_up, operation.run_up + operation.settling)
-    cycles = case.gears.teeth[0] * (angle(end) - angle(0.0)) / (2.0 * np.pi)
+    cycles = case.gears.teeth[0] * case.driver_angle(end) / (2.0 * np.pi)
     return {
         "solver_mesh_cycles": cycles,
         "solver_real_time_factor": end / spent if spent > 0.0 else 0.0,

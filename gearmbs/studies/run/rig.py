@@ -100,11 +100,11 @@ def gear_rig(
     start = run_up if start is None else to_si(start, "time", "start")
     if start < run_up:
         raise ValueError(f"start: {start:g} s is before the end of run_up, {run_up:g} s; give a later one")
-    angle = drive_angle(speed, run_up, start, point.rotation)
-    load = load_torque(point.torque if torque is None else torque, run_up, start, resisting(pair))
     shaft_radius = to_si(shaft_radius, "length", "shaft_radius")
     shaft_length = to_si(shaft_length, "length", "shaft_length")
     shaft_density = to_si(shaft_density, "density", "shaft_density")
+    angle = drive_angle(speed, run_up, start, point.rotation)
+    load = load_torque(point.torque if torque is None else torque, run_up, start, resisting(pair))
     place = pair.placement(0.0)
     rig = Mechanism("gear pair on two shafts")
     mass = shaft_density * np.pi * shaft_radius**2 * shaft_length
