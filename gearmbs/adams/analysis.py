@@ -176,7 +176,8 @@ def _part(session: Session, command: Simulate, watch: Watch, times: np.ndarray) 
                 f"{DEFAULT_TOLERANCE:g}; ERROR = {options['tol']:g} is used"
             )
             solution, equilibrium = _solve(session, command, kind, model, times, options, False, watch.stops())
-        if watch.turned_round(RequestEvaluator(model, solution)):
+        evaluator = RequestEvaluator(model, solution)
+        if watch.turned_round(evaluator):
             solution, equilibrium = _solve(session, command, kind, model, times, options, False, watch.stops())
         if watch.sensors:
             solution, fired = _to_passage(session, command, watch, model, times, options, solution)
@@ -185,7 +186,9 @@ def _part(session: Session, command: Simulate, watch: Watch, times: np.ndarray) 
         told.kept = kept_until(session, command, kind, model, error, options)
         raise told from error
 
-    segment, evaluator = segment_of(session, command, kind, model, solution, options, note, equilibrium)
+    if evaluator.solution is not solution:
+        evaluator = RequestEvaluator(model, solution)
+    segment = segment_of(session, command, kind, evaluator, options, note, equilibrium)
     if kind not in ("STATICS", "INITIAL_CONDITIONS"):
         segment.passage = singular_passage(solution)
     if kind in ("DYNAMICS", "TRANSIENT"):
@@ -439,20 +442,19 @@ def segment_of(
     session: Session,
     command: Simulate,
     kind: str,
-    model: AdamsModel,
-    solution: Solution,
+    evaluator: RequestEvaluator,
     options: dict[str, Any],
     note: str | None,
     equilibrium: StaticResult | None = None,
-) -> tuple[Segment, RequestEvaluator]:
-    """Return an analysis with its requests, forces, tracks and variables, and what evaluates more of it.
+) -> Segment:
+    """Return an analysis with its requests, forces, tracks and variables.
 
     Raises
     ------
     DeckError
         If a REQUEST cannot be evaluated.
     """
-    evaluator = RequestEvaluator(model, solution)
+    model, solution = evaluator.model, evaluator.solution
     segment = Segment(command, kind, model, solution, options, note, equilibrium=equilibrium)
     if kind != "STATICS":
         segment.assembly = assembly_of(model, solution)
@@ -466,7 +468,7 @@ def segment_of(
     segment.tracks = tracks_of(model, solution)
     segment.variables = evaluator.variables()
     segment.note = "\n".join(filter(None, [note, *off_the_end(model, solution)])) or None
-    return segment, evaluator
+    return segment
 
 
 def kept_until(
@@ -477,5 +479,5 @@ def kept_until(
     if model is None or solution is None or solution.t.size == 0:
         return None
     with contextlib.suppress(ModelError, DeckError, ArithmeticError):
-        return segment_of(session, command, kind, model, solution, options, None)[0]
+        return segment_of(session, command, kind, RequestEvaluator(model, solution), options, None)
     return None

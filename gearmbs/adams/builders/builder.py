@@ -22,6 +22,7 @@ from gearmbs.adams.builders.scopes import (
     Beam,
     BodyState,
     Present,
+    acting,
     acts,
     joints_of,
     marker_pair,
@@ -143,7 +144,7 @@ class Builder:
 
     @cached_property
     def _acting(self) -> dict[type[st.Statement], list[Any]]:
-        return {kind: [s for s in group.values() if acts(s, self.inactive)] for kind, group in self.deck.items.items()}
+        return acting(self.deck, self.inactive)
 
     def absent_marker(self, statement: st.Statement) -> int | None:
         """Return a marker of a statement that is left out with what it is on; None without one."""
@@ -155,12 +156,8 @@ class Builder:
         with warnings.catch_warnings(record=True) as warned, np.errstate(over="raise"):
             warnings.simplefilter("always")
             try:
-                missing = [ref for ref in joints_of(statement) if ("JOINT", ref) in self.left_out]
-                if missing:
-                    raise LeftOutError(f"with JOINT/{missing[0]}, which is left out,")
-                absent = self.absent_marker(statement)
-                if absent is not None:
-                    raise LeftOutError(f"at MARKER/{absent}, which is left out,")
+                if self.left_out:
+                    self._refuse_without(statement)
                 add(statement)
             except (ModelError, ValueError) as error:
                 self.remark(ERROR, statement, str(error))
@@ -171,6 +168,15 @@ class Builder:
                 self.remark(ERROR, statement, "its numbers are too large or too small to compute with")
         for warning in warned:
             self.remark(WARNING, statement, str(warning.message))
+
+    def _refuse_without(self, statement: st.Statement) -> None:
+        """Raise a LeftOutError if a statement needs a joint or a marker that is left out."""
+        missing = [ref for ref in joints_of(statement) if ("JOINT", ref) in self.left_out]
+        if missing:
+            raise LeftOutError(f"with JOINT/{missing[0]}, which is left out,")
+        absent = self.absent_marker(statement)
+        if absent is not None:
+            raise LeftOutError(f"at MARKER/{absent}, which is left out,")
 
     def remark(self, severity: str, statement: st.Statement, what: str, joiner: str = ": ") -> None:
         self.problems.append(Diagnostic(severity, f"{statement.label()}{joiner}{what}", self.deck.file, statement.line))

@@ -86,6 +86,11 @@ def acts(s: st.Statement, inactive: frozenset[tuple[str, int]]) -> bool:
     return (s.keyword, s.id) not in inactive and resting_joint(s, inactive) is None
 
 
+def acting(deck: Deck, inactive: frozenset[tuple[str, int]]) -> dict[type[st.Statement], list[Any]]:
+    """Return the active statements of a deck by their class."""
+    return {kind: [s for s in group.values() if acts(s, inactive)] for kind, group in deck.items.items()}
+
+
 def marker_pair(deck: Deck, s: Any) -> tuple[int, int | None]:
     """Return the ids of the markers I and J of what transmits a force, None for a J that there is not."""
     if joints_of(s):

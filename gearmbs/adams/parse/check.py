@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
+from typing import NamedTuple
 
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic, labels_of
 from gearmbs.adams.parse import statements as st
@@ -12,9 +14,31 @@ from gearmbs.adams.parse.grammar import CHOICE, EXPRESSION, Spec, specs_of
 from gearmbs.mechanism.forces.friction import KINDS
 
 
-def arguments(cls: type, fact: Callable[[Spec], object]) -> list[str]:
-    """Return the arguments of a statement of which something holds."""
-    return [name for name, spec in specs_of(cls).items() if fact(spec)]
+class Arguments(NamedTuple):
+    """Arguments of a class of statements of which something holds, see `Spec`."""
+
+    required: list[str]
+    positive: list[str]
+    unsigned: list[str]
+    refused: list[str]
+    idle: list[str]
+
+
+@cache
+def arguments_of(cls: type) -> Arguments:
+    """Return what is asked of the arguments of a class of statements."""
+    specs = specs_of(cls).items()
+
+    def those(fact: Callable[[Spec], object]) -> list[str]:
+        return [name for name, spec in specs if fact(spec)]
+
+    return Arguments(
+        required=those(lambda spec: spec.required),
+        positive=those(lambda spec: spec.positive),
+        unsigned=those(lambda spec: spec.unsigned),
+        refused=those(lambda spec: spec.instead is not None),
+        idle=those(lambda spec: spec.idle),
+    )
 
 
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")
@@ -43,7 +67,8 @@ def check(deck: Deck) -> list[Diagnostic]:
     _check_ground(deck, errors)
     for statement in deck:
         cls = type(statement)
-        required = arguments(cls, lambda spec: spec.required)
+        asked = arguments_of(cls)
+        required = asked.required
         if cls is st.Marker and (statement.flex_body or statement.point_mass or statement.fe_part):  # type: ignore[attr-defined]
             required = []
         if getattr(statement, "data_file", None) or _by_routine(statement):
@@ -56,11 +81,11 @@ def check(deck: Deck) -> list[Diagnostic]:
         for name in refused_arguments(statement):
             message = refused_message(statement, name)
             deck.diagnostics.append(Diagnostic(UNSUPPORTED, message, deck.file, statement.given[name]))
-        for name in arguments(cls, lambda spec: spec.positive):
+        for name in asked.positive:
             value = getattr(statement, name)
             if value is not None and not value > 0.0:
                 fail(statement, f"{specs_of(cls)[name].keyword} = {value}; it must be positive", name)
-        for name in arguments(cls, lambda spec: spec.unsigned):
+        for name in asked.unsigned:
             value = getattr(statement, name)
             if value is not None and value < 0.0:
                 fail(statement, f"{specs_of(cls)[name].keyword} = {value}; it must not be negative", name)
@@ -105,8 +130,11 @@ def _by_routine(statement: st.Statement) -> bool:
 
 def refused_arguments(statement: st.Statement) -> list[str]:
     """Return the arguments of a statement that are not supported, but for those that switch something off."""
-    names = arguments(type(statement), lambda spec: spec.instead is not None)
-    return [name for name in names if name in statement.given and getattr(statement, name) != "OFF"]
+    return [
+        name
+        for name in arguments_of(type(statement)).refused
+        if name in statement.given and getattr(statement, name) != "OFF"
+    ]
 
 
 Fail = Callable[..., None]
@@ -120,7 +148,7 @@ def _remark_idle(deck: Deck) -> None:
         if isinstance(statement, st.CurveStatement) and _by_routine(statement):
             # its routine gives the points from MINPAR to MAXPAR
             continue
-        for name in arguments(type(statement), lambda spec: spec.idle):
+        for name in arguments_of(type(statement)).idle:
             # a CURVE's routine is asked from MINPAR to MAXPAR
             ranges = isinstance(statement, st.CurveStatement) and _by_routine(statement)
             if name in statement.given and not ranges:
