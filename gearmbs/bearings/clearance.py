@@ -61,7 +61,7 @@ class ClearanceForce(ForceElement):
 
 
 CLEARANCE, STIFFNESS, EXPONENT, DAMPING, DEPTH = range(5)
-"""Reals: c (m, half the diametral clearance), K (N/m^m), m, C (N s/m), depth of the damping (m)."""
+"""Reals: c (m, half the diametral clearance), K (N/m^m), m, C (N s/m), depth of full damping (m)."""
 WORK = 27
 
 
@@ -114,7 +114,9 @@ def _write_column(r, z, n, u, along, e, dr, dz, du, by_depth, by_speed, force, j
 
 @njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def clearance_bearing(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
-    """Write the force of a bore on its journal; nothing inside the clearance.
+    """Write the force of a bore on its journal, at the origin of I on both bodies; nothing inside the clearance.
+
+    Through the journal's middle it has no moment about its axis: there is no friction.
 
     Arguments as in `gearmbs.dae.equations.loads.forces`; there are no inputs. Diagnostics: elastic energy, power
     dissipated, penetration.

@@ -245,6 +245,7 @@ def both_sides(options, wheels, scratch, want):
         side.xd[i] = sign * motion.xd[i]
         side.twist[i] = -motion.twist[i] if i % 2 == 1 else motion.twist[i]
     set_twist(wheels, side, -1.0)
+    # sums of the second side are added in the mirror: they are mirrored for it if it adds any, and back afterwards
     turned = side_contacts(options, wheels, scratch, -1, totals, want)
     if root:
         if not turned:

@@ -418,6 +418,8 @@ def side_contacts(options, wheels, scratch, sign, totals, want):
         depth = wheels.added_material - flank_strips(scratch, options.slices, want) + side.pitch_mismatch_bound
         if depth <= 0.0:
             return False
+        # the gap's slope along the face is 2 (p sin + q cos)/w and its second derivative by alpha the line of action's
+        # length, so that the alpha of the least gap, and with it the contact on the profile, moves along the face
         turn = 2.0 * (side.x[L.Q] * middle.sin[0] - side.x[L.P] * middle.cos[0]) / (side.w * side.length)
         wander = max(side.base_1, abs(side.base_2)) * abs(turn) * (wheels.face_high - wheels.face_low)
     if sign < 0:

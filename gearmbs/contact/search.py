@@ -11,7 +11,11 @@ from gearmbs.contact.records import kernel, strip_at
 from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
 from gearmbs.contact.support.profiles import GENTLE
 
+# a parabola falls less from one step to the next the nearer it is to its foot, so that 1 would do where the contact
+# moves evenly along the profile; it need not
 STEEPEST = 3.0  # how much faster `path_excess` may fall beyond an end of the face than between its last two nodes
+# the least gap over alpha bends by g_za^2 / g_aa along the face, with g_za = 2 tilt / w at most and g_aa the line of
+# action's length: reach^2 / 2 of it is how far it leaves its tangent, of which twice as much is allowed for
 BENDING = 4.0  # bound of the gap's bending along the face of an internal pair, as a multiple of the tilt squared
 SAME_PITCH = 1e-13  # tilt times the tangent of the base helix below which all pairs of helical flanks have one gap
 PITCHES_APART = 2.5  # bound of how normal pitches of tilted helical wheels differ, as a multiple of that product
@@ -244,7 +248,10 @@ def teeth_in_reach(wheels, side, depth, wander):
 
 @kernel
 def path_excess(wheels, side, strip, j, shift):
-    """Return how much the gap of a pair in section ``j`` grows at least for standing beyond the path of contact."""
+    """Return how much the gap of a pair in section ``j`` grows at least for standing beyond the path of contact.
+
+    ``side.curve`` is what the last `teeth_in_reach` has found.
+    """
     over_1 = strip.roll_1[j] + shift - wheels.wheel_1.tip_roll
     over_2 = strip.roll_2[j] - shift - wheels.wheel_2.tip_roll
     x = max(max(over_1, over_2), 0.0)

@@ -60,7 +60,7 @@ def told_names(
     """
     told = dict(single)
     for known in (single, {**items, **single}):
-        told = known | told
+        told = {**known, **told}
         for (value, by), slope in slopes.items():
             if by.name and value in told:
                 of = f"({told[value]})" if told[value].startswith("d ") else told[value]

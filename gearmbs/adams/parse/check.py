@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from typing import NamedTuple
 
 from gearmbs.adams.errors import ERROR, UNSUPPORTED, WARNING, Diagnostic, labels_of
@@ -24,21 +23,26 @@ class Arguments(NamedTuple):
     idle: list[str]
 
 
-@cache
+_ARGUMENTS: dict[type, Arguments] = {}
+
+
 def arguments_of(cls: type) -> Arguments:
-    """Return what is asked of the arguments of a class of statements."""
+    """Return what is asked of the arguments of a class of statements, which is found once."""
+    if cls in _ARGUMENTS:
+        return _ARGUMENTS[cls]
     specs = specs_of(cls).items()
 
     def those(fact: Callable[[Spec], object]) -> list[str]:
         return [name for name, spec in specs if fact(spec)]
 
-    return Arguments(
+    _ARGUMENTS[cls] = Arguments(
         required=those(lambda spec: spec.required),
         positive=those(lambda spec: spec.positive),
         unsigned=those(lambda spec: spec.unsigned),
         refused=those(lambda spec: spec.instead is not None),
         idle=those(lambda spec: spec.idle),
     )
+    return _ARGUMENTS[cls]
 
 
 MARKER_FIELDS = ("i", "j", "rm", "jfloat", "cm", "im", "vm", "wm", "cv", "corner", "icm", "irm", "jrm", "iicm", "jicm")

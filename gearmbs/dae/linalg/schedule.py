@@ -153,6 +153,9 @@ def _levels(u_ptr, u_pos):
 def _operations(rank, a_ptr, a_pos, u_ptr, u_pos, l_ptr, l_pos, level, l_at, u_at, pivot_at):
     """Return ``a_to``, and for each operation on the factors, column by column, its level and ``op_to, op_l, op_u``.
 
+    Of the numbers f of the factors an operation changes one, f[op_to] -= f[op_l] f[op_u]; before them entry e of the
+    matrix is put to f[a_to[e]].
+
     Columns that are set aside need none: what stands above their pivots is never used.
 
     Parameters

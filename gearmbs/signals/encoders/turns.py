@@ -300,6 +300,7 @@ class _Laid:
             others = np.concatenate((total[i, :j], total[i, j + 1 :], total[:i, j], total[i + 1 :, j]))
             if total[i, j] <= best + 1e-9 and others.min(initial=np.inf) > best + MARGIN:
                 result[i] = j
+        # both ends are index pulses, or pulses that fit, of known marks
         result[0] = 0
         if not open_end:
             result[-1] = targets.size - 1
