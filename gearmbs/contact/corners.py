@@ -41,6 +41,8 @@ PLANE = 1.0  # radius, m, of the cylinder that stands for a plane
 def line_offset(side, vx, vy, zeta):
     """Offset in the section of two lines whose places in their wheels' own planes differ by ``v``; see below."""
     p, q = side.x[L.P], side.x[L.Q]
+    # a plane across one wheel's axis leans against the section by (p, q): places in it are stretched along the tilt,
+    # and both axes part by 2 zeta (p, q) / w
     along = (p * vx + q * vy) * side.m - 2.0 * zeta * side.i_w
     return side.x[L.A] + vx + p * along, vy + q * along
 
@@ -67,12 +69,14 @@ def line_distance(side, vx, vy, tx, ty, cx, cy, zeta):
     iw, iw3, iw5 = side.i_w, side.i_w3, side.i_w5
     m, mw, mww = side.m, side.m_w, side.m_ww
     d, d_x, d_xx = side.lines.d, side.lines.d_x, side.lines.d_xx
+    # d = (a, 0) + v + (p, q) s, s = (p v_x + q v_y) m - 2 zeta / w
     kap = p * vx + q * vy
     for axis in range(2):
         u = p if axis == 0 else q
         v = vx if axis == 0 else vy
         d[axis] = (a if axis == 0 else 0.0) + v + u * (kap * m - 2.0 * zeta * iw)
     for i in range(5):
+        # w = sqrt(1 - p^2 - q^2): w_p = -p / w, so that m_p = -m_w p / w and (1 / w)_p = p / w^3
         mi = -mw * iw * (p if i == 1 else (q if i == 2 else 0.0))
         wi = iw3 * (p if i == 1 else (q if i == 2 else 0.0))
         vix = tx if i == 3 else (cx if i == 4 else 0.0)
@@ -91,6 +95,7 @@ def line_distance(side, vx, vy, tx, ty, cx, cy, zeta):
             vjy = ty if j == 3 else (cy if j == 4 else 0.0)
             kj = p * vjx + q * vjy + (vx if j == 1 else (vy if j == 2 else 0.0))
             sj = mj * kap + m * kj - 2.0 * zeta * wj
+            # second derivatives of m and 1 / w: both only by p and q
             pij = (p if i == 1 else q) * (p if j == 1 else q) if 1 <= i <= 2 and 1 <= j <= 2 else 0.0
             same = 1.0 if i == j and 1 <= i <= 2 else 0.0
             mij = mww * pij * iw * iw - mw * (same * iw + pij * iw3)
@@ -121,6 +126,7 @@ def distance_gap(side, strip, k, tip, sign, offset, want):
     p, q = side.x[L.P], side.x[L.Q]
     d, d_x, d_xx = side.lines.d, side.lines.d_x, side.lines.d_xx
     dx, dy = d[0], d[1]
+    # of an offset d in the section the part along the axes, p d_x + q d_y, is no distance of parallel lines
     lean = p * dx + q * dy
     dist = np.sqrt(dx * dx + dy * dy - lean * lean)
     strip.gap[k] = sign * (dist - offset)
@@ -150,6 +156,7 @@ def distance_gap(side, strip, k, tip, sign, offset, want):
                 lij += dix
             elif j == 2:
                 lij += diy
+            # D^2 = d.d - l^2: D_ij = (d_i.d_j + d.d_ij - l_i l_j - l l_ij - D_i D_j) / D
             value = dix * djx + diy * djy + dx * dijx + dy * dijy - li * lj - lean * lij - gi_ * gj
             strip.hess[xi, xj, k] = sign * value / dist
 
@@ -194,6 +201,7 @@ def corner_on_plane(side, corner, strip, k, first, eta, at, away, want):
     """
     r, se, ce = corner.radius[k], corner.sin[k], corner.cos[k]
     sb, cb = np.sin(eta), np.cos(eta)
+    # the axis of the cylinder that touches the plane at the radius ``at``
     x = at * cb + (PLANE - away) * sb
     y = at * sb - (PLANE - away) * cb
     line_distance(side, -r * ce - x, -r * se - y, r * se, -r * ce, y, -x, strip.zeta[k])
@@ -211,6 +219,7 @@ def corner_starts(side, corner, strip, n, rb, normal):
     """
     a, p, q, m, i_w = side.x[0], side.x[2], side.x[3], side.m, side.i_w
     alpha, s0, c0 = normal.alpha[0], normal.sin[0], normal.cos[0]
+    # the involute of a base circle begins with no radius of curvature: corners close to it are on its tangent plane
     near = NEAR_BASE * NEAR_BASE * rb * rb
     for j in range(n):
         r = corner.radius[j]
@@ -219,6 +228,8 @@ def corner_starts(side, corner, strip, n, rb, normal):
         X = a + vx + p * along
         Y = vy + q * along
         lean = p * X + q * Y
+        # from the mate's axis the tangent to the base circle is sqrt(R^2 - r_b^2) long, the length of roll; its normal
+        # is the foot's
         R2 = X * X + Y * Y
         strip.good[j] = 1.0 if R2 - lean * lean - rb * rb > near else 0.0
         roll = np.copysign(np.sqrt(max(R2 - rb * rb, near)), rb)
@@ -258,7 +269,10 @@ def corner_normals(side, corner, strip, n, s0, rb):
             s = s0 + rb * (strip.alpha[j] + normal_turn(A, B, tilt)) + corner.rounding[j]
             sn = sa * ce + ca * se
             cs = ca * ce - sa * se
+            # V: the corner's place along the tilt, in its wheel's own plane; see the table of support functions
             V = A * sn + B * cs
+            # first and second derivative of g = a sin - 2 A zeta / w - h_corner - h_flank by alpha, whose zero is the
+            # normal
             g1 = a * ca - A * B * s * i_w * i_k - rb * i_k - r * (cs + m * B * V) - 2.0 * B * zeta * i_w
             g2 = s * (A * A * i_w - B * B * w * i_k2) * i_k - a * sa + r * (sn + m * A * V) + 2.0 * A * zeta * i_w
             step = min(max(-g1 / g2, -LARGEST_TURN), LARGEST_TURN)
@@ -302,6 +316,7 @@ def corner_sections(side, corner, strip, n, kind, f, want):
         cs = ca * corner.cos[j] - sa * corner.sin[j]
         h = corner_slopes(A, B, kap, sn, cs, corner.radius[j], corner.rounding[j], tilt)
         g = involute_slopes(A, B, kap, s, rb, tilt)
+        # by the envelope theorem the gradient is that at a fixed alpha
         gA = -h.A - g.A - 2.0 * zeta * kap * kap * i_w3
         gB = -h.B - g.B - 2.0 * zeta * A * B * i_w3
         strip.roll_1[j] = corner.roll[j] if first else s
@@ -310,6 +325,7 @@ def corner_sections(side, corner, strip, n, kind, f, want):
         strip.gap[j] = a * sa - 2.0 * A * i_w * zeta - (h.h + g.h)
         strip.grad[0, j] = sa
         strip.grad[1, j] = 0.0
+        # A = p sin + q cos, B = p cos - q sin
         strip.grad[2, j] = gA * sa + gB * ca
         strip.grad[3, j] = gA * ca - gB * sa
         strip.grad[4, j] = -h.F if first else -g.F
@@ -329,6 +345,8 @@ def corner_sections(side, corner, strip, n, kind, f, want):
         put_curvatures(
             strip, j, sa, ca,
             GapCurvatures(
+                # g by alpha twice, by alpha and A, B and the two spins, and then without alpha; alpha goes by g_xx -
+                # g_xalpha g_alphax / g_alphaalpha
                 2.0 * A * i_w * zeta - a * sa - (c.alpha_alpha + d.alpha_alpha),
                 -(c.alpha_A + d.alpha_A) - 2.0 * zeta * A * B * i_w3,
                 -(c.alpha_B + d.alpha_B) - 2.0 * zeta * (i_w + B * B * i_w3),
@@ -358,6 +376,7 @@ def set_corner(wheel, corner, j, f, roll):
     else:
         rb = wheel.base_radius
         tan = roll / rb
+        # half the tooth's angle at the radius whose pressure angle has this tangent: psi_b - inv(alpha)
         psi = wheel.half_angle - tan + np.arctan(tan)
         corner.radius[j] = np.copysign(np.sqrt(rb * rb + roll * roll), rb)
         corner.rounding[j] = 0.0

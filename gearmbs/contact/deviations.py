@@ -67,12 +67,18 @@ def roll_of_flanks(side, wheels, lookup, wheel, f1, f2, zeta):
     sign = 1.0 if wheel == 0 else -1.0
     own = rb1 if wheel == 0 else rb2
     half_1, half_2 = wheels.wheel_1.half_angle, wheels.wheel_2.half_angle
+    # half-way between the flanks: s_1 = (r_b1 F_1 - r_b2 F_2 + (r_b1 - r_b2) alpha + L) / 2 on wheel 1, on wheel 2 with
+    # the other sign but for L
     diff = 0.5 * sign * (rb1 * (f1 + half_1) - rb2 * (f2 + half_2) + side.base_difference * alpha)
+    # cos alpha = R_b / a and L = sqrt(a^2 - R_b^2): alpha_a = R_b / (a L), L_a = a / L
     k1 = Rb / (a * l)
     turn = 2.0 * zeta * own
     twist = side.twist_1 if wheel == 0 else side.twist_2
     half = 0.5 * sign * side.x[L.H]
+    # a tilt turns the normal of a section by 2 zeta (q / a - p R_b / (a L)), a helix the tooth by the place along the
+    # axis
     lookup.roll = diff + 0.5 * l + turn * (q / a - p * k1) - twist * (zeta + half)
+    # derivatives of alpha_a by a
     k1_a = -Rb * (1.0 / (a * a * l) + 1.0 / l**3)
     slope = 0.5 * sign * side.base_difference
     grad, hess = lookup.grad, lookup.hess
@@ -111,12 +117,14 @@ def roll_under_corner(side, corner, strip, j, lookup, wheel, want):
     a, zeta = side.x[L.A], strip.zeta[j]
     mate = side.base_1 if wheel == 0 else side.base_2
     r, se, ce = corner.radius[j], corner.sin[j], corner.cos[j]
+    # from the mate's axis, moved by the tilt to first order
     Px = a - r * ce - 2.0 * side.x[L.P] * zeta
     Py = -r * se - 2.0 * side.x[L.Q] * zeta
     s2 = Px * Px + Py * Py - mate * mate
     if s2 < SHORTEST * SHORTEST * mate * mate:
         lookup.roll += SHORTEST * mate - corner.rounding[j]
         return
+    # the mate's length of roll there: s^2 = P^2 - r_b^2
     s = np.copysign(np.sqrt(s2), mate)
     lookup.roll += s - corner.rounding[j]
     i_s = 1.0 / s
@@ -132,6 +140,7 @@ def roll_under_corner(side, corner, strip, j, lookup, wheel, want):
         dy = -r * ce * turn[i]
         dx -= 2.0 * zeta if i == L.P else 0.0
         dy -= 2.0 * zeta if i == L.Q else 0.0
+        # s_i = P . P_i / s
         by_i = (Px * dx + Py * dy) * i_s
         grad[i] += by_i
         if want == 0:
@@ -141,6 +150,7 @@ def roll_under_corner(side, corner, strip, j, lookup, wheel, want):
             ey = -r * ce * turn[k]
             ex -= 2.0 * zeta if k == L.P else 0.0
             ey -= 2.0 * zeta if k == L.Q else 0.0
+            # s_ik = (P_i . P_k + P . P_ik - s_i s_k) / s, P_ik of a place on a circle turned by its angle
             value = dx * ex + dy * ey - by_i * (Px * ex + Py * ey) * i_s
             value += turn[i] * turn[k] * r * (Px * ce + Py * se)
             hess[i, k] += value * i_s
@@ -194,6 +204,7 @@ def cubic(reals, o, n, u):
     t = u - k
     y1 = reals[o + k]
     y2 = reals[o + k + 1]
+    # slopes at both ends of the piece: half the difference of the neighbours; none at the ends of the curve
     m1 = 0.0 if k == 0 else 0.5 * (y2 - reals[o + k - 1])
     m2 = 0.0 if k == n - 2 else 0.5 * (reals[o + k + 2] - y1)
     d = y2 - y1
@@ -279,6 +290,7 @@ def add_shape(options, reals, wheel, shape, sign, h, lookup, strip, j, want):
     want : int
         Nonzero to add second derivatives.
     """
+    # the shape's own coordinate, -1 to 1 over its wheel's face
     scale = 2.0 / wheel.face_width
     z = (strip.zeta[j] + sign * 0.5 * h) * scale
     value, by_s, by_z, by_ss, by_sz = shape_value(options, reals, wheel, shape, lookup.roll, z)
@@ -293,6 +305,7 @@ def add_shape(options, reals, wheel, shape, sign, h, lookup, strip, j, want):
     mixed = by_sz * z_h
     for i in range(6):
         for k in range(i, 6):
+            # d(s(x), z(h)): d_ik = d_ss s_i s_k + d_s s_ik, and d_sz s_i z_h beside h
             strip.hess[i, k, j] += by_ss * grad[i] * grad[k] + by_s * lookup.hess[i, k]
         strip.hess[min(i, L.H), max(i, L.H), j] += mixed * grad[i]
     strip.hess[L.H, L.H, j] += mixed * grad[L.H]

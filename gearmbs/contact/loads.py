@@ -108,10 +108,12 @@ def add_stiffness_gradient(sums, pair, strip, loads, n, want):
         return
     inverse = 1.0 / pair.stiffness_factor
     for k in range(6):
+        # f is in proportion to the factor s: df/dx = f s_x / s
         relative = pair.stiffness_factor_x[k] * inverse
         for j in range(n):
             loads.force_x[k, j] += loads.force[j] * relative
     for j in range(n):
+        # and Q has -U s_x / s, in which U changes with the gaps by dU/dg = -f_elastic
         elastic = loads.elastic[j] * inverse
         for k in range(6):
             for i in range(6):
@@ -123,6 +125,7 @@ def finish_stiffness_gradient(sums, pair, energy, want):
     """Add the force of a stiffness that varies along the path, from the pair's elastic energy."""
     ratio = energy / pair.stiffness_factor
     for i in range(6):
+        # Q = -dU/dx at fixed gaps: -U s_x / s
         sums.q[i] -= ratio * pair.stiffness_factor_x[i]
     if want == 0:
         return
@@ -289,6 +292,7 @@ def add_normal(sums, strip, loads, n, want):
         sums.q[i] += value
     if want == 0:
         return
+    # Q = f g_x: Q_x = g_x f_x^T + f g_xx, Q_x' = g_x f_x'^T
     add_outer(sums.q_x, grad, loads.force_x, n)
     add_curvatures(sums.q_x, force, strip.hess, n)
     add_outer(sums.q_xd, grad, loads.force_xd, n)
@@ -308,12 +312,15 @@ def friction_directions(side, strip, loads, n):
         sa, ca = strip.sin[j], strip.cos[j]
         pn, pt = loads.normal[j], loads.tangent[j]
         zp = strip.zeta[j] + half_h
+        # the point is at pn n + pt t + zp z, n = (sin, cos), t = (cos, -sin): moments about wheel 1 are its products
+        # with t and with z
         t3, t4 = zp * sa, zp * ca
         z3, z4 = pn * ca - pt * sa, -pn * sa - pt * ca
         profile[0, j], profile[1, j], profile[2, j] = ca, -sa, 0.0
         profile[3, j], profile[4, j], profile[5, j] = t3, t4, -pn
         axial[0, j], axial[1, j], axial[2, j] = 0.0, 0.0, 1.0
         axial[3, j], axial[4, j], axial[5, j] = z3, z4, 0.0
+        # a unit wrench times the twist is the velocity along it
         loads.v_profile[j] = ca * v0 - sa * v1 + t3 * v3 + t4 * v4 - pn * v5
         loads.v_axial[j] = v2 + z3 * v3 + z4 * v4
 
@@ -337,6 +344,7 @@ def friction_forces(sums, loads, n, totals):
     """Fill the friction forces, and add their wrench and their power."""
     power = 0.0
     for j in range(n):
+        # F = -(mu(v)/v) f v, whose power is F . v
         vt, vz, scale = loads.v_profile[j], loads.v_axial[j], -loads.ratio[j] * loads.force[j]
         loads.f_profile[j] = scale * vt
         loads.f_axial[j] = scale * vz
@@ -379,6 +387,7 @@ def friction_slope(strip, loads, j, k, spin, dz, half_h):
     z4 = -un * sa - ut * ca
     dvt = t3 * v3 + t4 * v4 - dn * v5 - da * (sa * v0 + ca * v1)
     dvz = z3 * v3 + z4 * v4
+    # F by the pose: through f, and through the sliding velocity
     df = loads.force_x[k, j]
     loads.profile_x[k, j] = -ratio * vt * df + tt * dvt + tz * dvz
     loads.axial_x[k, j] = -ratio * vz * df + tz * dvt + zz * dvz
@@ -387,6 +396,7 @@ def friction_slope(strip, loads, j, k, spin, dz, half_h):
     loads.axial_v[k, j] = tz * t + zz * z
     loads.sliding[k, j] = -ratio * (vt * t + vz * z)
     ft, fz = loads.f_profile[j], loads.f_axial[j]
+    # and the unit wrenches that F goes with turn
     loads.turned[0, k, j] = -ft * sa * da
     loads.turned[1, k, j] = -ft * ca * da
     loads.turned[2, k, j] = 0.0
@@ -402,6 +412,7 @@ def friction_slopes(side, strip, loads, n):
     spin = (side.twist[0], side.twist[1], side.twist[3], side.twist[4], side.twist[5])
     for j in range(n):
         vt, vz, force = loads.v_profile[j], loads.v_axial[j], loads.force[j]
+        # R(v) = mu/v: dF_i/dv_j = -f (R delta_ij + (R'/v) v_i v_j)
         straight, curve = -force * loads.ratio[j], -force * loads.ratio_slope[j]
         loads.pp[j] = straight + curve * vt * vt
         loads.pa[j] = curve * vt * vz
@@ -456,6 +467,7 @@ def add_friction(wheels, kind, side, sums, strip, loads, n, totals, want):
 def mirror(sums, want):
     """Reflect all sums in the plane of the axes: the other flanks are the same problem seen in a mirror."""
     for i in range(6):
+        # of the pose q, phi_1 and phi_2 change sign, of twists and wrenches every second number
         si = -1.0 if i > 2 else 1.0
         fi = -1.0 if i % 2 == 1 else 1.0
         sums.q[i] *= si

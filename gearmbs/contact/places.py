@@ -80,6 +80,7 @@ def end_slopes(side, wheel, k, end, sig, limit, want):
 @kernel
 def limit_value(side, wheels, end, sig):
     """Limit of the common face towards ``end``: the nearer end face of the two wheels, blended where they tie."""
+    # the smaller of two at the upper end, the larger at the lower one: (u + v -+ |u - v|)/2, |d| as sqrt(d^2 + blend^2)
     u = end_value(side, wheels.wheel_1, 0, end, sig)
     v = end_value(side, wheels.wheel_2, 1, end, sig)
     blend = wheels.end_blend
@@ -111,6 +112,7 @@ def limit_slopes(side, wheels, end, sig, limit, one, two, want):
     d = u - v
     r = np.sqrt(d * d + blend * blend)
     limit.value = 0.5 * (u + v - end * r)
+    # slopes of that by u and v, and its second derivative by u - v
     wu = 0.5 * (1.0 - end * d / r)
     wv = 1.0 - wu
     for i in range(6):
@@ -147,6 +149,7 @@ def level(side, strip, n, want):
 def put_gradient(side, strip, by_A, by_B, by_1, by_2):
     """Fill the gap's gradient by the pose from slopes by the tilt along and across the normal, and by the spins."""
     p, q, sa, ca = side.x[L.P], side.x[L.Q], strip.sin[0], strip.cos[0]
+    # tilt along and across the normal: dA/dp = sin, dA/dq = cos, dB/dp = cos, dB/dq = -sin
     A, B = p * sa + q * ca, p * ca - q * sa
     gA, gB = by_A[0] * A + by_A[1] * B, by_B * A
     strip.grad[0, 0] = sa
@@ -167,6 +170,7 @@ def level_flanks(side, strip):
     strip.roll_1[0] = s1
     strip.roll_2[0] = s2
     strip.kind[0] = 0.0
+    # endless flanks on parallel axes: the line of action less both lengths of roll
     strip.gap[0] = side.length - (s1 + s2)
     put_gradient(side, strip, (-(s1 + s2), -half), -half, -rb1, -rb2)
 
@@ -182,12 +186,15 @@ def level_normal(X, Y, rb, s0, c0):
     turn, sin, cos : float
         Angle of the normal from that of flank on flank, whose sine and cosine are ``s0`` and ``c0``; its own ones.
     """
+    # the normal through the corner is tangent to the base circle: sqrt(R^2 - r_b^2) long, which is the length of roll
+    # there
     R2 = X * X + Y * Y
     square = R2 - rb * rb
     bears = square > NEAR_BASE * NEAR_BASE * rb * rb
     roll = np.copysign(np.sqrt(max(square, 0.0)), rb)
     inverse = 1.0 / R2
     sa, ca = (roll * X - rb * Y) * inverse, (rb * X + roll * Y) * inverse
+    # sine of the turn, and one more than its cosine
     over, beside = sa * c0 - ca * s0, 1.0 + (ca * c0 + sa * s0)
     if abs(over) > LARGEST_TURN * beside:
         turn = np.arctan2(over, beside - 1.0)
@@ -222,6 +229,7 @@ def level_corner(side, corner, strip, kind, start):
     bears, turn, sa, ca = level_normal(side.x[L.A] - r * ce, -r * se, rb, side.sin_0, side.cos_0)
     if not bears:
         return False
+    # g = a sin(alpha) - r sin(alpha + eta) - rho - r_b (phi + psi + alpha), stationary in alpha
     alpha = side.alpha_0 + turn
     s = rb * (start + alpha)
     sn, cs = sa * ce + ca * se, ca * ce - sa * se
@@ -232,6 +240,7 @@ def level_corner(side, corner, strip, kind, start):
     strip.roll_2[0] = s if first else corner.roll[0]
     strip.kind[0] = float(kind)
     strip.gap[0] = side.x[L.A] * sa - (r * sn + rounding + s)
+    # to first order in the tilt, which acts half-way between the wheels
     half = 0.5 * (r * cs + rb)
     by_own, by_mate = -r * cs, -rb
     by_1, by_2 = (by_own, by_mate) if first else (by_mate, by_own)
@@ -294,6 +303,7 @@ def contact_points(side, corner, strip, loads, n, f, corners, want):
         B = p * ca - q * sa
         kap = np.sqrt(1.0 - B * B)
         zp = strip.zeta[j] + half_h
+        # length of roll, and the support function h of the involute with its slopes
         s = rb * (f + strip.alpha[j] + strip.turn[j])
         h = involute_slopes(A, B, kap, s, rb, tilt)
         c = h
@@ -302,6 +312,8 @@ def contact_points(side, corner, strip, loads, n, f, corners, want):
             cs = ca * corner.cos[j] - sa * corner.sin[j]
             c = corner_slopes(A, B, kap, sn, cs, corner.radius[j], corner.rounding[j], tilt)
         bears = strip.kind[j] == 1.0
+        # half-way between the surfaces: the support function of wheel 1, or of its corner, and half the gap; where the
+        # section stands along the tilted axis moves both
         loads.normal[j] = (c.h if bears else h.h) + A * i_w * zp + 0.5 * strip.gap[j]
         loads.tangent[j] = (c.alpha if bears else h.alpha) + B * i_w * zp
         loads.slope_A[j] = c.A if bears else h.A
@@ -336,6 +348,7 @@ def point_slopes(side, corner, strip, loads, n, f, corners):
         normal_B = loads.slope_B[j] + cross
         tangent_A = (c.alpha_A if bears else h.alpha_A) + cross
         tangent_B = (c.alpha_B if bears else h.alpha_B) + (i_w + B * B * i_w3) * zp
+        # derivatives by alpha, which moves with the pose by alpha_x
         by_n = loads.tangent[j]
         by_t = (c.alpha_alpha if bears else h.alpha_alpha) - A * i_w * zp
         x = strip.alpha_x

@@ -70,6 +70,7 @@ def plane_force(law, width, strip, loads, totals, want):
     totals.damping_power += width * (p - elastic) * rate
     if want != 0:
         for i in range(6):
+            # delta = -g: df/dx = -b (p_delta g_x + p_rate g'_x), and df/dx' = -b p_rate g_x, as g' = g_x . x'
             g = strip.grad[i, 0]
             loads.force_x[i, 0] = -width * (p_d * g + p_r * strip.rate_x[i, 0])
             loads.force_xd[i, 0] = -width * p_r * g
@@ -86,6 +87,7 @@ def touching_parts(strip, loads, n, cut):
     gap = strip.gap
     for i in range(n):
         j = float(i)
+        # where the face begins and ends, in slices from this node on; its first and last slice reach as far as it does
         ua, ub = low - j, high - j
         first, last = j == begin, j == end
         counts = (j >= lowest) and (j < highest) and (ua < 1.0 or last) and (ub > 0.0 or first)
@@ -95,6 +97,7 @@ def touching_parts(strip, loads, n, cut):
         slope = d1 - d0
         da, db = d0 + slope * ua, d0 + slope * ub
         counts = counts and (ub > ua) and (da > 0.0 or db > 0.0)
+        # the depth d0 + slope u vanishes at u = -d0 / slope
         loads.low[i] = (-d0 / slope if da < 0.0 else ua) if counts else 0.0
         loads.high[i] = (-d0 / slope if db < 0.0 else ub) if counts else 0.0
         loads.depth[i] = max(da, db) if counts else 0.0
@@ -173,6 +176,7 @@ def slice_values(law, strip, loads, n, width):
         u0, p0, _, _, a0, e0, b0 = at_point(copy, d0, slope, r0, rs, counts, low, span, t0)
         u1, p1, _, _, a1, e1, b1 = at_point(copy, d0, slope, r0, rs, counts, low, span, t1)
         u2, p2, _, _, a2, e2, b2 = at_point(copy, d0, slope, r0, rs, counts, low, span, t2)
+        # Gauss's sum of weight span p(u); a point's force is shared by the nodes as 1 - u and u
         m0, m1, m2 = w0 * span, w1 * span, w2 * span
         loads.force_left[i] = m0 * (1.0 - u0) * p0 + m1 * (1.0 - u1) * p1 + m2 * (1.0 - u2) * p2
         loads.force_right[i] = m0 * u0 * p0 + m1 * u1 * p1 + m2 * u2 * p2
@@ -188,6 +192,8 @@ def bound_slopes(u, t, span, share, p, grown):
 
     ``grown`` is the derivative of the pressure by the place in the slice.
     """
+    # F = span sum of share v p, or u p, at u = low + span t: as the lower bound moves by one the span falls by one and
+    # u moves by 1 - t, as the upper one does it grows and u moves by t
     v = 1.0 - u
     left = span * (v * grown - p) * share
     right = span * (u * grown + p) * share
@@ -214,6 +220,8 @@ def slice_curvatures(law, strip, loads, n, width):
         u2, p2, d_2, r_2, _, _, _ = at_point(copy, d0, slope, r0, rs, counts, low, span, t2)
         m0, m1, m2 = w0 * span, w1 * span, w2 * span
         v0, v1, v2 = 1.0 - u0, 1.0 - u1, 1.0 - u2
+        # moments of the slopes by depth and rate: dF_left = -(k_ll dg_left + k_lr dg_right), as depths are shared as
+        # forces are
         ll0, ll1, ll2 = m0 * v0 * v0, m1 * v1 * v1, m2 * v2 * v2
         lr0, lr1, lr2 = m0 * v0 * u0, m1 * v1 * u1, m2 * v2 * u2
         rr0, rr1, rr2 = m0 * u0 * u0, m1 * u1 * u1, m2 * u2 * u2
@@ -225,6 +233,7 @@ def slice_curvatures(law, strip, loads, n, width):
         loads.r_rr[i] = rr0 * r_0 + rr1 * r_1 + rr2 * r_2
         slope = slope if counts else 0.0
         rs = rs if counts else 0.0
+        # along the slice the pressure changes with its depth and with its rate
         a0, b0, c0, e0 = bound_slopes(u0, t0, span, w0, p0, d_0 * slope + r_0 * rs)
         a1, b1, c1, e1 = bound_slopes(u1, t1, span, w1, p1, d_1 * slope + r_1 * rs)
         a2, b2, c2, e2 = bound_slopes(u2, t2, span, w2, p2, d_2 * slope + r_2 * rs)
@@ -245,6 +254,7 @@ def clipped_slopes(strip, loads, n):
         at_high = loads.clip_high[i] != 0.0
         left = loads.left_low[i] if at_low else loads.left_high[i]
         right = loads.right_low[i] if at_low else loads.right_high[i]
+        # the touch ends at u = -d0 / (d1 - d0): du/dd0 = -d1 / slope^2, du/dd1 = d0 / slope^2, and d = -g
         i_s2 = 1.0 / (slope * slope)
         c0 = -d1 * i_s2 if (at_low or at_high) else 0.0
         c1 = d0 * i_s2 if (at_low or at_high) else 0.0
@@ -278,6 +288,7 @@ def node_forces(loads, n, totals):
 @inlined
 def slice_slope(strip, loads, i, k):
     """Fill the derivatives of one slice's forces by one pose number and its rate."""
+    # by the pose through depths, and through rates with the gradient's own change; by its rates through rates alone
     g0, g1 = strip.grad[k, i], strip.grad[k, i + 1]
     h0, h1 = strip.rate_x[k, i], strip.rate_x[k, i + 1]
     r_ll, r_lr, r_rr = loads.r_ll[i], loads.r_lr[i], loads.r_rr[i]
@@ -325,6 +336,7 @@ def moving_end(loads, i, low, limit, width):
     by_left = loads.left_low[i] if low else loads.left_high[i]
     by_right = loads.right_low[i] if low else loads.right_high[i]
     for k in range(6):
+        # the limit's motion in slices
         moved = limit.grad[k] / width
         loads.x_left[k, i] += by_left * moved
         loads.x_right[k, i] += by_right * moved
@@ -357,14 +369,19 @@ def end_force(law, strip, i, width, u, sign, limit, pair, sums, want):
     energy = stored_energy(elastic, law.e, delta)
     grad, hess = limit.grad, limit.hess
     for m in range(6):
+        # U = integral of the energy density up to the limit: dU/dx has the density there times dlimit/dx, and Q =
+        # -dU/dx
         sums.q[m] -= sign * energy * grad[m]
     if want == 0:
         return
     softened = energy / pair.stiffness_factor
     for j in range(6):
+        # the depth at the limit: changed by its motion along the slice, and by the gaps at both nodes
         dd = slope / width * grad[j] - (1.0 - u) * strip.grad[j, i] - u * strip.grad[j, i + 1]
         for m in range(6):
+            # dw/ddelta is the elastic pressure
             moved = elastic * dd * grad[m] + energy * hess[m, j]
+            # w is in proportion to the factor of a stiffness that varies along the path
             moved += softened * (grad[m] * pair.stiffness_factor_x[j] + grad[j] * pair.stiffness_factor_x[m])
             sums.q_x[m, j] -= sign * moved
 

@@ -108,6 +108,7 @@ def tape_row_rates(k, t, y, tab, room):
     grad, hess = room[0:n], room[n:]
     value = expressions.second(k, t, y, tab, grad, hess)
     partial = grad[n - 1]
+    # Phi'' = Phi_q q'' + q'.Phi_qq q' + 2 Phi_qt.q' + Phi_tt; gamma is all but the first
     rate, gamma = partial, hess[n * n - 1]
     for i in range(n - 1):
         b = tab.extra_i[row[T.TAPE_BODIES] + i // 6]
@@ -145,12 +146,14 @@ def world_inertia(kin_row, body_row, out):
         for d in range(3):
             total = 0.0
             for e in range(3):
+                # A J_b
                 total += kin_row[KIN_A + 3 * c + e] * body_row[T.BODY_INERTIA + 3 * e + d]
             out[half + 3 * c + d] = total
     for c in range(3):
         for d in range(c, 3):
             total = 0.0
             for e in range(3):
+                # (A J_b) A^T, whose upper half is enough
                 total += out[half + 3 * c + e] * kin_row[KIN_A + 3 * d + e]
             out[packed(c, d)] = total
 
@@ -220,6 +223,7 @@ def put_bodies(slot, vals, y, rhs, idata, tab):
         i = tab.at[b, T.AT_V]
         mass = tab.body[b, T.BODY_MASS]
         for c in range(3):
+            # m v' = m g + F; J w' = h x w + N, with h = J w (Euler)
             rhs[i + c] = mass * tab.gravity[c]
         world_inertia(kin, tab.body[b], s)
         k = put_inertia(idata[T.H_MODE], slot, vals, k, i, mass, s)
@@ -264,6 +268,7 @@ def put_term(slot, vals, k, row, j, idata, tab):
             continue
         h, q = 6 * side, tab.at[b, T.AT_V]
         kin = tab.kin[b]
+        # Phi' = Phi_R v + Phi_pi w + Phi_t
         rate += terms.dot3(g, h, kin, KIN_V) + terms.dot3(g, h + 3, kin, KIN_W)
         if is_elastic(b, tab.at):
             gamma += bias_rate(b, g, h, tab.at, tab.partial)

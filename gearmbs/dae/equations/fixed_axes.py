@@ -115,12 +115,14 @@ def turn_body(k, y, axes, turns, fval, kin):
     phi, omega = turn_of(k, y, axes, turns, fval)
     c, s = np.cos(phi), np.sin(phi)
     for q in range(9):
+        # A(phi) = a + b cos(phi) + c sin(phi), by Rodrigues' formula
         at = TURN_MATRIX + q
         row[KIN_A + q] = turn[at] + c * turn[at + 9] + s * turn[at + 18]
     for q in range(3):
         at = TURN_ARM + q
         row[KIN_R + q] = turn[at] + c * turn[at + 3] + s * turn[at + 6]
         row[KIN_W + q] = omega * turn[TURN_AXIS + q]
+    # v = omega x rho, before C is added to rho
     cross3(row, KIN_W, row, KIN_R, row, KIN_V)
     for q in range(3):
         row[KIN_R + q] += turn[TURN_POINT + q]
@@ -160,6 +162,7 @@ def lever(k, marker, turns, tab, s):
     body = tab.kin[tab.marker_body[marker]]
     for c in range(3):
         s[c] = body[KIN_R + c] + tab.frame[marker, T.MK_ARM + c] - turns[k, TURN_POINT + c]
+    # n . (r x F) = (n x r) . F: the lever of a force about the axis
     cross3(turns[k], TURN_AXIS, s, 0, s, 3)
 
 
@@ -170,6 +173,7 @@ def weight_moment(k, axes, turns, tab, s):
     if axes[k, AXIS_SEEN] == 0:
         # its centre of mass is on the axis
         return 0.0, 0.0
+    # n . (rho x m g) = m (n x rho) . g, which changes with phi by m (n x (n x rho)) . g
     for c in range(3):
         s[c] = body[KIN_R + c] - turn[TURN_POINT + c]
     cross3(turn, TURN_AXIS, s, 0, s, 3)
@@ -246,6 +250,7 @@ def axes_residual(t, y, yp, out, idata, rdata, work):
         omega, phi = axes[k, AXIS_OMEGA], axes[k, AXIS_PHI]
         if omega >= 0:
             weight, _ = weight_moment(k, axes, turns, tab, s)
+            # J omega' - sum of moments - that of the weight, and omega - phi'
             out[omega] = turns[k, TURN_INERTIA] * yp[omega] - tab.kin[k + 1, KIN_FORCE] - weight
             out[phi] = y[omega] - yp[phi]
     for k in range(idata[T.H_STATES]):
@@ -297,6 +302,7 @@ def prepare_chain(k, turns, tab, s):
 def chain(k, omega, d, at, turns, s):
     """Return the derivatives by phi and omega of body k + 1 from the spatial ones in ``d[at:]``."""
     n = turns[k]
+    # dR = n x rho, dpi = n, dv = omega n x (n x rho) by phi; dv = n x rho, dw = n by omega
     by_phi = dot3(d, at, s, 3) + dot3(d, at + 3, n, TURN_AXIS) + omega * dot3(d, at + 6, s, 6)
     return by_phi, dot3(d, at + 6, s, 3) + dot3(d, at + 9, n, TURN_AXIS)
 
@@ -376,6 +382,7 @@ def moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k):
         sign = 1.0 - 2.0 * side
         lever(b, point, turns, tab, s)
         for c in range(3):
+            # the moment about the axis, (n x r) . F + n . N, as a weighted sum of the six rows
             weights[c] = sign * s[3 + c] if has_force else 0.0
             weights[3 + c] = sign * turns[b, TURN_AXIS + c] if has_torque else 0.0
         k = weighted_entries(
@@ -387,6 +394,7 @@ def moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k):
             # the point moves with the body that it is on
             lever(owner, point, turns, tab, s)
             cross3(s, 3, wrench, 0, moment_rate, 0)
+            # its lever changes by n_b . ((n_o x (P - C_o)) x F) as the owner turns
             moved = sign * dot3(turns[b], TURN_AXIS, moment_rate, 0)
             k = put(mode, slot, vals, k, axes[b, AXIS_OMEGA], axes[owner, AXIS_PHI], -moved)
     return k

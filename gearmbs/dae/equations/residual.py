@@ -96,6 +96,7 @@ def add_load(b, sign, row, y, marker_body, kin, frame, scratch):
         return
     s, body = vector_at(scratch, S_VECTOR, 9), kin[b]
     if row[T.FORCE_F] >= 0:
+        # a force at I's origin has the moment arm x F about the centre of mass; minus since rows of eq. (5) hold -H^T F
         arm_to(b, row[T.FORCE_I], marker_body, kin, frame, s, 0)
         for c in range(3):
             s[3 + c] = sign * y[row[T.FORCE_F] + c]
@@ -139,6 +140,7 @@ def add_tape_row(k, t, lam, mu, y, tab, out):
         at, kin = tab.at[b], tab.kin[b]
         for c in range(3):
             along, about = grad[6 * p + c], grad[6 * p + 3 + c]
+            # Phi' = Phi_R u + Phi_theta eps + Phi_t, and the rows of lambda and mu in (5) and (6)
             rate += along * own_rate(b, c, y, tab.at, tab.kin) + about * own_rate(b, 3 + c, y, tab.at, tab.kin)
             kin[KIN_FORCE + c] += lam * along
             kin[KIN_SHIFT + c] += mu * along
@@ -164,6 +166,7 @@ def add_constraints(t, y, yp, idata, tab, out):
         if tab.row[r, T.ROW_FUNCTION] >= 0:
             fun = tab.row[r, T.ROW_FUNCTION]
             f, f1 = tab.fval[fun, 0], tab.fval[fun, 1]
+            # Phi = sum of k phi - f(t)
             value, rate = -f, -f1
         lam, mu = multipliers_of_row(r, y, yp, idata)
         for k in range(tab.row[r, T.ROW_FIRST], tab.row[r + 1, T.ROW_FIRST]):
@@ -193,6 +196,7 @@ def add_constraints(t, y, yp, idata, tab, out):
             )
             value += coef * phi
             rate += coef * phi_t
+            # the gradient by both frames' [dR, dpi]: rate by velocities, lambda to (5), mu to (6)
             for side in range(2):
                 b = tab.marker_body[tab.term[k, T.TERM_I + side]]
                 if b == 0:

@@ -70,6 +70,7 @@ def colour_columns(indptr, indices, colours):
         Written.
     """
     n = colours.shape[0]
+    # the pattern by rows: which columns share one
     row_ptr = np.zeros(n + 1, dtype=np.int64)
     for p in range(indices.shape[0]):
         row_ptr[indices[p] + 1] += 1
@@ -82,6 +83,7 @@ def colour_columns(indptr, indices, colours):
             i = indices[p]
             row_cols[fill[i]] = j
             fill[i] += 1
+    # colour c is taken for column j if taken[c] is j, so that it need not be cleared for each column
     taken = np.full(n + 1, -1, dtype=np.int64)
     colours[:] = -1
     count = 0
@@ -206,6 +208,7 @@ def _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, wide
     indices = idata[idata[INDICES] :]
     for q in range(colour_ptr[c], colour_ptr[c + 1]):
         j = columns[q]
+        # the second difference is for columns whose increment was far below their typical magnitude
         if wide and not _hidden(j, y, yp, cj, rdata, n):
             continue
         y_moved[j] = y[j] + _increment(j, y, yp, cj, rdata[n + j] if wide else rdata[j])
@@ -213,12 +216,14 @@ def _difference_colour(residual, t, y, yp, cj, vals, idata, rdata, work, c, wide
     residual(t, y_moved, yp_moved, moved, idata, rdata, work)
     for q in range(colour_ptr[c], colour_ptr[c + 1]):
         j = columns[q]
+        # what the sum was rounded to, not what was added
         d = y_moved[j] - y[j]
         if d == 0.0:
             continue
         narrow = _increment(j, y, yp, cj, rdata[j])
         for p in range(indptr[j], indptr[j + 1]):
             i = indices[p]
+            # a wider difference has a larger error of its own: it is taken where the first was lost in rounding
             if not wide or abs(vals[p]) * narrow <= VISIBLE * EPS * terms[i]:
                 vals[p] = (moved[i] - base[i]) / d
 
@@ -264,6 +269,7 @@ def _add_rates(residual, t, y, yp, cj, vals, idata, rdata, work):
         residual(t, y, yp_moved, ahead, idata, rdata, work)
         for q in range(first, last):
             j = columns[q]
+            # central difference: (G(y' + d) - G(y' - d)) / 2d
             d = 2.0 * INCREMENT_OF_RATE * max(abs(yp[j]), rdata[2 * n + j])
             for p in range(indptr[j], indptr[j + 1]):
                 vals[p] += cj * ((ahead[indices[p]] - behind[indices[p]]) / d)
@@ -301,6 +307,7 @@ def _difference_together(residual, t, y, yp, cj, vals, idata, rdata, work):
     indices = idata[idata[INDICES] :]
     terms[:] = 0.0
     for j in range(n):
+        # what each equation is summed up from: rounding of a difference is that of its largest term
         size = max(abs(y[j]), abs(yp[j]) / cj if cj > 0.0 else 0.0)
         for p in range(indptr[j], indptr[j + 1]):
             terms[indices[p]] += abs(vals[p]) * size

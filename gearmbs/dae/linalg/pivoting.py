@@ -62,6 +62,7 @@ def equilibrate(indptr, indices, vals, row_scale, col_scale):
     col_top = np.zeros(n)
     row_scale[:] = 1.0
     for _ in range(EQUILIBRATION_SWEEPS):
+        # entries come near one as both scales take the root of the largest one, half of the way each
         row_top[:] = 0.0
         for j in range(n):
             col_top[j] = 0.0
@@ -76,6 +77,7 @@ def equilibrate(indptr, indices, vals, row_scale, col_scale):
             if col_top[i] > 0.0:
                 col_scale[i] /= np.sqrt(col_top[i])
     for i in range(n):
+        # powers of two: scaling rounds nothing
         row_scale[i] = 2.0 ** np.round(np.log2(row_scale[i]))
         col_scale[i] = 2.0 ** np.round(np.log2(col_scale[i]))
 
@@ -242,15 +244,19 @@ def _best_pivot(columns, rows, top, peak, drop, threshold):
     best_ratio = 0.0
     looked = 0
     for count in range(1, n + 1):
+        # what is left has count entries at least in row and column: no pivot costs less than (count - 1)^2 products
         if best_cost <= (count - 1) * (count - 1):
             break
         j = chead[count]
         while j >= 0:
+            # a column that has cancelled is rounding, and gives no pivot
             if top[j] > drop * peak[j]:
                 for p in range(cstart[j], cstart[j] + count):
+                    # threshold pivoting: no multiplier is larger than 1 / threshold
                     ratio = abs(cvals[p]) / top[j]
                     if ratio < threshold:
                         continue
+                    # Markowitz's cost, (r - 1)(c - 1), bounds the entries that fill in; of equal costs the larger pivot
                     cost = (rlen[cpool[p]] - 1) * (count - 1)
                     if cost < best_cost or (cost == best_cost and ratio > best_ratio):
                         best_cost = cost
@@ -276,6 +282,7 @@ def _best_pivot(columns, rows, top, peak, drop, threshold):
                     best_row = i
                     best_col = j
             looked += 1
+            # columns of this length have been looked at: what is left in rows costs count (count - 1) at least
             if best_cost <= count * (count - 1) or (looked >= SEARCH_LIMIT and best_row >= 0):
                 return best_row, best_col
             i = rafter[i]
@@ -315,6 +322,7 @@ def _take_out(columns, rows, row, col, below, right, multipliers):
         i = pool[p]
         if i == row:
             continue
+        # l_i = a_i / pivot
         below[e] = i
         multipliers[e] = vals[p] / pivot
         e += 1
@@ -322,6 +330,7 @@ def _take_out(columns, rows, row, col, below, right, multipliers):
         end = start[i] + length[i] - 1
         for q in range(start[i], end + 1):
             if row_pool[q] == col:
+                # the order in a line says nothing: the last entry takes the place of one that goes
                 row_pool[q] = row_pool[end]
                 break
         length[i] -= 1
@@ -372,6 +381,7 @@ def _eliminate(columns, rows, row, below, right, multipliers, place, top, peak):
         _unlink(j, length[j], head, after, before)
         first = start[j]
         last = first + length[j] - 1
+        # u is the column's entry in the pivot's row, which belongs to U and leaves what is left
         u = 0.0
         for p in range(first, last + 1):
             if pool[p] == row:
@@ -380,16 +390,19 @@ def _eliminate(columns, rows, row, below, right, multipliers, place, top, peak):
                 vals[p] = vals[last]
                 break
         for p in range(first, last):
+            # where each row of the column stands, to find in one step what a multiple is taken off
             place[pool[p]] = p
         count = last - first
         for m in range(below.shape[0]):
             p = place[below[m]]
             if p >= 0:
+                # a_ij -= l_i u_j; where there is no entry it fills in, below
                 vals[p] -= multipliers[m] * u
             else:
                 count += 1
         length[j] = last - first
         if count > room[j]:
+            # twice the room, so that a column that grows is moved seldom
             if not _make_room(columns, j, 2 * count):
                 return False
         for m in range(below.shape[0] if count > length[j] else 0):
@@ -487,6 +500,7 @@ def choose_pivots(indptr, indices, scaled, drop, threshold, columns, rows):
             top[j] = max(top[j], abs(scaled[p]))
     peak = top.copy()
     largest = max(np.max(peak), TINY)
+    # the first column comes first among those of equal length
     for m in range(n - 1, -1, -1):
         _link(m, columns.length[m], columns.head, columns.after, columns.before)
         _link(m, rows.length[m], rows.head, rows.after, rows.before)

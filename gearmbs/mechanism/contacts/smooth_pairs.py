@@ -34,6 +34,7 @@ def by_distance(row, centre, radius, phi, hess, normal, pose, origin_a, origin_b
     work : ndarray, shape (12,)
         Scratch.
     """
+    # the ball touches where its centre is less than its radius from the solid
     depth = radius - phi
     row[pt.DEPTH] = depth
     for q in range(3):
@@ -43,15 +44,19 @@ def by_distance(row, centre, radius, phi, hess, normal, pose, origin_a, origin_b
         return
     rel, turn, local, bent = work[0:3], work[3:6], work[6:9], work[9:12]
     for c in range(12):
+        # variation c of the centre against the solid, in whose frame the normal, the gradient of phi, changes by the
+        # Hessian
         relative(c, centre, origin_a, origin_b, rel)
         to_local(pose, rel, local)
         for q in range(3):
             turn[q] = hess[3 * q] * local[0] + hess[3 * q + 1] * local[1] + hess[3 * q + 2] * local[2]
         to_global(pose, turn, bent)
         if c >= 9:
+            # a turn of the solid turns the normal with it
             turned(c - 9, normal, turn)
             for q in range(3):
                 bent[q] += turn[q]
+        # d depth = -n . d(centre - solid): to first order the normal's own change does not count
         sink = -dot(normal, rel)
         row[pt.D_DEPTH + c], row[pt.D_GAIN + c] = sink, 0.0
         if c >= 6:
@@ -114,6 +119,7 @@ def convex_and_plane(row, kind, sizes, pose_a, pose_b, origin_a, origin_b, deriv
     normal, w, y, place, hess = work[12:15], work[0:3], work[15:18], work[18:21], work[21:30]
     for q in range(3):
         normal[q] = pose_b[3 * q + 2]
+        # the outermost point against the plane: that of the support function at w = -n
         place[q] = -normal[q]
     to_local(pose_a, place, w)
     support(kind, sizes, w, y, hess)
@@ -121,6 +127,7 @@ def convex_and_plane(row, kind, sizes, pose_a, pose_b, origin_a, origin_b, deriv
     depth = 0.0
     for q in range(3):
         place[q] += pose_a[9 + q]
+        # depth = -n . (P - plane)
         depth -= normal[q] * (place[q] - pose_b[9 + q])
     row[pt.DEPTH], row[pt.GAIN] = depth, 1.0
     for q in range(3):

@@ -248,6 +248,7 @@ def simulate(
         than the loads press them; if a function of the user fails, its
         ``solution`` has what was computed until then.
     """
+    # 1. what is asked for
     settings: dict[str, Any] = {**options}
     if watch and consumer is None:
         raise ModelError("watch: what it names is handed to a consumer; give consumer=, too")
@@ -271,35 +272,26 @@ def simulate(
     check_stops(stops)
     # its kernels are loaded before the first one is called, so that all that lack are compiled in one round
     INTEGRATORS[name].load()
+    # 2. the equations, and where they start and end
     asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
+    t_model = t_start if initial is None else initial.t_model
     system, problem, members, lumping = prepared(
-        mechanism, t_start if initial is None else initial.t_model, lump, formulation, rate_scale,
-        continued or initial is not None,
-    )  # fmt: skip
+        mechanism, t_model, lump, formulation, rate_scale, continued or initial is not None
+    )
     if initial is not None:
-        if initial.controllers:
-            warn_of_unmet(initial.controllers)
         # events in what is left of the last step would be missed
-        history = None if stops else initial.history_for(problem, name, tol)
-        settings |= starting_options(name, history)
-        problem = initial.problem(problem, history)
-        # as in a `Simulator`, a line ends where the state is, and what it prescribes jumps to another rate there
-        led = {name: number for name, number in problem.numbers.items() if number.slope(problem.rdata) != 0.0}
-        for number in led.values():
-            number.write(problem.rdata, initial.t, number.value(problem.rdata, initial.t))
-        if led:
-            settings.pop("history", None)
-        if any(number.prescribes for number in led.values()):
-            settings["check_start"] = False
+        problem = _from_state(
+            initial, problem, None if stops else initial.history_for(problem, name, tol), settings, name
+        )
     if stops:
         if lump or not INTEGRATORS[name].can("event_action"):
             able = any_of(those_that("event_action"))
             raise ModelError(f"stops: they need the integrator {able}, and lump=False")
         problem = with_stops(problem, mechanism.state_names, int(problem.idata[tables.H_Z]), stops)
         settings.update(stop_options(stops))
-    t_model = t_start if initial is None else initial.t_model
     settings |= with_brief_changes(system, t_model, float(t_eval[-1]), settings)
     problem.advice = {**ADVICE, **(advice or {})}
+    # 3. who is told of the steps, and the steps
     held, lumping = locking_remark(mechanism, system), lumping if asked else ""
     remark = " ".join(text for text in (held, lumping) if text)
     watched = Watch(system, problem, members, watch) if watch and INTEGRATORS[name].can("consumer") else None
@@ -319,6 +311,7 @@ def simulate(
             cut = replace(result, status=Status.USER_ERROR, message=str(error))
             error.solution = Solution(system, problem, cut, members, remark)
         raise
+    # 4. what they say
     solution = Solution(system, problem, result, members, remark)
     solution.inside = just_inside(t_eval)
     solution.initial = initial
@@ -329,6 +322,25 @@ def simulate(
     warn_of_spin(mechanism.bodies, solution)
     warn_of_lost_torques(mechanism.elements, solution)
     return solution
+
+
+def _from_state(
+    initial: State, problem: DAEProblem, history: History | None, settings: dict[str, Any], integrator: str
+) -> DAEProblem:
+    """Return the problem that starts in a state, with its history if there is one; complete the settings for it."""
+    if initial.controllers:
+        warn_of_unmet(initial.controllers)
+    settings |= starting_options(integrator, history)
+    problem = initial.problem(problem, history)
+    # as in a `Simulator`, a line ends where the state is, and what it prescribes jumps to another rate there
+    led = [number for number in problem.numbers.values() if number.slope(problem.rdata) != 0.0]
+    for number in led:
+        number.write(problem.rdata, initial.t, number.value(problem.rdata, initial.t))
+    if led:
+        settings.pop("history", None)
+    if any(number.prescribes for number in led):
+        settings["check_start"] = False
+    return problem
 
 
 def starting_options(integrator: str, history: History | None) -> dict[str, Any]:

@@ -334,8 +334,10 @@ def add_inertia_change(q_f, first, state, j0, sums, body_row):
     yy, yz, zz = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
     lanes = q_f.size // LANES
     for g in range(lanes):
+        # J(q) = J0 + sum_k q_k (J1_k + dJ/dq_k) / 2, dJ/dq_k = J1_k + sum_l J2_kl q_l
         moved = 0.5 * lanes_at(q_f, g)
         along_x, along_y, along_z = lanes_at(state, g), lanes_at(state, 3 * lanes + g), lanes_at(state, 5 * lanes + g)
+        # second moments to moments of inertia: J_xx is the sum of those along y and z
         put_lanes(state, g, along_y + along_z)
         put_lanes(state, 3 * lanes + g, along_x + along_z)
         put_lanes(state, 5 * lanes + g, along_x + along_y)
@@ -374,6 +376,7 @@ def complete(first, state, b):
 def inertia_change(change, k, w, i, out, j):
     """Write dJ/dq_k w to ``out[j:j+3]``, body components, w in ``w[i:i+3]``; ``change`` as of `present`."""
     x, y, z = w[i], w[i + 1], w[i + 2]
+    # symmetric, by its entries xx, xy, xz, yy, yz, zz
     out[j] = change[0, k] * x + change[1, k] * y + change[2, k] * z
     out[j + 1] = change[1, k] * x + change[3, k] * y + change[4, k] * z
     out[j + 2] = change[2, k] * x + change[4, k] * y + change[5, k] * z
@@ -390,6 +393,7 @@ def add_momentum(y, at, partial, kin_row):
     for m in range(3):
         total = all_lanes(0.0)
         for g in range(lanes):
+            # h gains sum_k H_k v_k, in body components, turned by A below
             total = total + lanes_at(h, m * lanes + g) * lanes_at(v_f, g)
         put_lanes(sums, m, total)
     x, y_, z = lanes_total(sums, 0), lanes_total(sums, 1), lanes_total(sums, 2)
