@@ -15,6 +15,7 @@ from benchmarks.methods.base import (
     RunFailed,
     RunResult,
     absolute_tolerances,
+    assign,
     tolerances,
 )
 from benchmarks.problems.reference import ReferenceProblem
@@ -40,14 +41,12 @@ def _prepare(formulation: str, solver_name: str) -> Callable:
             calls = Callbacks(problem)
             model = Implicit_Problem(calls.residual, problem.y0, problem.yp0, float(times[0]))
             model.jac = lambda c, t, y, yd: calls.dense(t, y, yd, c)
-            model.algvar = problem.error_mask.astype(float).tolist()
+            assign(model, {"algvar": problem.error_mask.astype(float).tolist()})
             solver = getattr(solvers, solver_name)(model)
-            solver.verbosity = QUIET
-            solver.rtol = SMALLEST_RTOL
-            solver.atol = absolute_tolerances(problem, tol)
-            solver.maxsteps = MAX_STEPS
+            tight = {"rtol": SMALLEST_RTOL, "atol": absolute_tolerances(problem, tol)}
+            assign(solver, {**tight, "verbosity": QUIET, "maxsteps": MAX_STEPS})
             if solver_name == "IDA":
-                solver.suppress_alg = True
+                assign(solver, {"suppress_alg": True})
             try:
                 t, y, _ = solver.simulate(float(times[-1]), 0, times[1:].tolist())
             except Exception as error:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -34,6 +36,13 @@ class RunResult:
 
     values: np.ndarray
     counts: dict[str, int] = field(default_factory=dict)
+
+
+def assign(target: Any, settings: Mapping[str, Any]) -> None:
+    """Set attributes of somebody else's object by their names, ``"newton.useModifiedNewton"`` of one inside it."""
+    for name, value in settings.items():
+        *owners, last = name.split(".")
+        setattr(functools.reduce(getattr, owners, target), last, value)
 
 
 class RunFailed(Exception):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.methods.base import Method, NotPossible, RunFailed, RunResult
+from benchmarks.methods.base import Method, NotPossible, RunFailed, RunResult, assign
 from benchmarks.methods.exudyn_models import MODELS, Model, four_bar_chain
 from benchmarks.problems.reference import ReferenceProblem
 
@@ -43,18 +43,18 @@ def simulate(model: Model, t_end: float, steps: int, solver: str, sparse: bool) 
     """
     exu, mbs = model.exu, model.mbs
     settings = exu.SimulationSettings()
-    integration = settings.timeIntegration
-    integration.numberOfSteps = steps
-    integration.endTime = t_end
-    integration.minimumStepSize = t_end / steps / SMALLEST_PART
-    integration.newton.useModifiedNewton = True
-    integration.verboseMode = 0
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = model.grid
-    settings.solution.sensors.active = True
-    settings.parallel.numberOfThreads = 1
-    settings.show.statistics = False
-    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse if sparse else exu.LinearSolverType.EXUdense
+    integration = {
+        "numberOfSteps": steps,
+        "endTime": t_end,
+        "minimumStepSize": t_end / steps / SMALLEST_PART,
+        "newton.useModifiedNewton": True,
+        "verboseMode": 0,
+    }
+    assign(settings.timeIntegration, integration)
+    assign(settings.solution, {"file.write": False, "sensors.writePeriod": model.grid, "sensors.active": True})
+    assign(settings, {"parallel.numberOfThreads": 1, "show.statistics": False})
+    kinds = exu.LinearSolverType
+    assign(settings, {"linearSolver.solverType": kinds.EigenSparse if sparse else kinds.EXUdense})
     kind = exu.DynamicSolverType.GeneralizedAlpha
     if solver == "trapezoidal index 2":
         kind = exu.DynamicSolverType.TrapezoidalIndex2

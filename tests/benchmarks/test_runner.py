@@ -1,6 +1,7 @@
 """The benchmark runner on small parts: measured once, saved, found again, reported; missing peers named."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,13 @@ def run(out, parts, **options):
     lines = []
     settings = {"quick": True, "fresh": False, "only": ""} | options
     return runner.run(parts, out, report=lines.append, **settings), lines
+
+
+def test_settings_of_other_programs_are_set_by_their_names():
+    newton = SimpleNamespace(modified=False)
+    solver = SimpleNamespace(steps=1, newton=newton)
+    base.assign(solver, {"steps": 7, "newton.modified": True})
+    assert (solver.steps, newton.modified) == (7, True)
 
 
 @pytest.mark.slow
