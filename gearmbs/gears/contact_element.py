@@ -23,6 +23,9 @@ DEEP = 0.02
 """Depth of teeth in each other, in modules, up to which no load is asked for: 0.06 mm at 3 mm, twice and a half what
 100 N m press the paper's wheels."""
 
+TOLD = [L.place(L.TOTALS, name) for name in ("depth_drive", "depth_coast", "normal_force")]
+"""Places of what is asked of a contact at the start: depths on both flanks, m, and the sum of normal forces, N."""
+
 
 def contact_kernels() -> tuple[Any, tuple[Any, Any]]:
     """Return the kernel of the force, and that of the contact below it with its signature; they are imported now."""
@@ -118,19 +121,18 @@ class GearContact(ForceElement):
 
         Teeth that jam by their drawing, for want of backlash, start as deep as that makes them.
         """
-        from gearmbs.contact import gear_contact, layout
+        from gearmbs.contact import gear_contact
 
         geometry = self.pair.geometry
         gi, gr, size = pack(self.pair)
-        wrench, jac, diag, zero = np.zeros(6), np.zeros((6, 24)), np.zeros(layout.DIAGNOSTICS), np.zeros(3)
-        origins = [np.ascontiguousarray(place) for place in (self.i.global_position(), self.j.global_position())]
-        axes = [np.ascontiguousarray(a) for a in (self.i.global_orientation(), self.j.global_orientation())]
+        wrench, jac, diag, zero = np.zeros(6), np.zeros((6, 24)), np.zeros(L.DIAGNOSTICS), np.zeros(3)
+        origins = self.i.global_position(), self.j.global_position()
+        axes = self.i.global_orientation(), self.j.global_orientation()
+        one, two, *turned = map(np.ascontiguousarray, (*origins, *axes))
         gear_contact(
-            gi, gr, origins[0], axes[0], zero, zero, origins[1], axes[1], zero, zero, wrench, jac, diag, 0,
-            np.zeros(size),
-        )  # fmt: skip
-        places = [layout.place(layout.TOTALS, name) for name in ("depth_drive", "depth_coast", "normal_force")]
-        drive, coast, force = diag[places].tolist()
+            gi, gr, one, turned[0], zero, zero, two, turned[1], zero, zero, wrench, jac, diag, 0, np.zeros(size)
+        )
+        drive, coast, force = diag[TOLD].tolist()
         jammed = max(0.0, geometry.jam_backlash - geometry.normal_backlash)
         depth = max(drive, coast)
         if depth <= DEEP * geometry.driver.module + jammed:

@@ -78,7 +78,7 @@ def test_a_row_and_a_module_make_a_format(tmp_path):
         read_signal(_text(tmp_path / "text.fak"))
     wrong = tmp_path / "wrong.wav"
     wrong.write_bytes(other.read_bytes())
-    with pytest.raises(SignalFileError, match=says("wav", "recording", "named", "holds", "pass format='fake'")):
+    with pytest.raises(SignalFileError, match=says("wav", "recording", "format='fake'")):
         read_signal(wrong)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -168,10 +168,17 @@ def _arguments(name: str, function: Callable) -> int:
     return len(taken)
 
 
-@contextmanager
-def raised_errors(functions: Iterable[UserFunction]) -> Iterator[None]:
+NOTHING = nullcontext()
+
+
+def raised_errors(functions: Iterable[UserFunction]) -> AbstractContextManager[None]:
     """Raise what went wrong in functions of the user inside, instead of what followed from it."""
     called = list(functions)
+    return _raised_errors(called) if called else NOTHING
+
+
+@contextmanager
+def _raised_errors(called: Sequence[UserFunction]) -> Iterator[None]:
     try:
         yield
     except Exception:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import replace
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -191,7 +190,7 @@ class Restored(Told):
         if self._run.started or any(number.prescribes for number in self._base.numbers.values()):
             # what is set next may let motions ask for the velocities that the state has
             return
-        with raised_errors(self._functions) if self._functions else nullcontext():
+        with raised_errors(self._functions):
             failure = self._run.begin()
         if failure is not None:
             own.update(before)

@@ -30,6 +30,7 @@ from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Span, span_of
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearmbs.gears import GearPair
     from gearmbs.mechanism import Mechanism
 
 
@@ -163,14 +164,16 @@ def evaluate(
         data[level], of_levels = level_parts(levels, np.array(COMPONENTS), case.mesh_frequency)
     if made & {"acceleration", *LEVELS}:
         assert forces is not None
-        t, acceleration = _acceleration(case, forces, start, signal_stop)
+        pair = case.pair()
+        about = _about_acceleration(case, pair)
+        t, acceleration = _acceleration(case, pair, forces, start, signal_stop)
         turning = {} if case.operation.speed_curve is None else _turning(case, t)
         if "acceleration" in wanted:
             told = {
-                **_about_acceleration(case),
+                **about,
                 "units": "m/s^2",
                 "long_name": "force on the driven gear over its mass (Newton's second law)",
-                "teeth_in_mesh": teeth_in_mesh(case, start),
+                "teeth_in_mesh": teeth_in_mesh(case, pair, start),
             }
             data["acceleration"] = ("signal_time", "component"), acceleration, told
             coords["signal_time"] = ("signal_time", t, {"units": "s"})
@@ -187,7 +190,7 @@ def evaluate(
                 units="m/s^2",
                 channels=COMPONENTS,
                 t0=float(t[0]),
-                attrs=_about_acceleration(case),
+                attrs=about,
             )
             data[level] = tracked_levels(case, signal, turning)
     return data, {**coords, **of_levels}
@@ -298,9 +301,11 @@ def _parts_over_time(t: np.ndarray, values: dict[str, np.ndarray]) -> Parts:
     return data, coords
 
 
-def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+def _acceleration(
+    case: Case, pair: GearPair, forces: _EvenForces, start: float, stop: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return times and the components of the force on the driven gear over its mass, at the signal rate."""
-    pair, rate = case.pair(), case.signal_rate
+    rate = case.signal_rate
     force, t = forces.values[:, -4:], forces.t
     if rate < case.output_rate:
         ratio = round(case.output_rate / rate)
@@ -315,9 +320,8 @@ def _acceleration(case: Case, forces: _EvenForces, start: float, stop: float) ->
     return t[first] + np.arange(len(values)) / rate, values
 
 
-def _about_acceleration(case: Case) -> dict[str, Any]:
+def _about_acceleration(case: Case, pair: GearPair) -> dict[str, Any]:
     """Return what is known of the acceleration besides its values."""
-    pair = case.pair()
     return {
         "pressure_angle": pair.working_pressure_angle,
         "mass": pair.wheels[1].mass,
@@ -327,14 +331,13 @@ def _about_acceleration(case: Case) -> dict[str, Any]:
     }
 
 
-def teeth_in_mesh(case: Case, time: float) -> list[float]:
+def teeth_in_mesh(case: Case, pair: GearPair, time: float) -> list[float]:
     """Return which teeth are on the line of centres at a time: ``[time, number, step, number, step]``, driver first.
 
     A wheel turned by psi from where its tooth 0 points along x has tooth z (mu - psi) / (2 pi) in the direction mu of
     the mesh: pi from the driven wheel, and from a driver inside a ring, else 0. A step is what the number changes by
     for each pitch that passes, 1 or -1; wheels turn against each other unless one is a ring.
     """
-    pair = case.pair()
     sense = pair.operating_point.rotation
     driver = sense * case.driver_angle(time)
     teeth, external = case.gears.teeth, pair.geometry.sign > 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Callable, Collection, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any, Never, Unpack
@@ -133,7 +134,7 @@ def simulate_case(
     operation, solver = case.operation, case.solver
     t_end = operation.run_up + operation.settling + operation.longest + case.edge
     # up to a whole sample
-    t_end = np.ceil(t_end * case.output_rate - 1e-6) / case.output_rate
+    t_end = math.ceil(t_end * case.output_rate - 1e-6) / case.output_rate
     return simulate(
         mechanism,
         t_end,
