@@ -48,9 +48,11 @@ def over_arc(side, corner, mate, f_root, zeta):
     psi = mate.fillet_angle
     sc, cc = np.sin(f_root + psi), np.cos(f_root + psi)
     rc = mate.fillet_centre_radius
+    # from the centre of the arc to the corner: on which side of the arc's two ends it is
     dx, dy = line_offset(side, -r * corner.cos[0] - rc * cc, -r * corner.sin[0] - rc * sc, zeta)
     if dx * sc - dy * cc < 0.0:
         return False
+    # where the arc begins at the flank, tangent to it
     end = f_root + psi - np.arcsin(mate.fillet_radius / rc)
     return dx * np.cos(end) + dy * np.sin(end) < 0.0
 
@@ -85,6 +87,7 @@ def root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want):
     if part == ON_CIRCLE:
         inside = np.copysign(1.0, side.x[L.A])  # -1: one wheel is within the other
         dx, dy = line_offset(side, 0.0, 0.0, zeta)
+        # the line of centres within the tip land: the land bears, else its nearer edge
         off = f_tip - np.arctan2(inside * dy, inside * dx)
         psi = abs(own.corner_angle)
         if abs(off) <= psi:
@@ -97,6 +100,7 @@ def root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want):
         return
     if part == ON_ARC:
         eta = f_root + mate.fillet_angle
+        # hollow: the gap grows as the distance from the arc's centre falls
         rs, rc = mate.fillet_centre_radius * np.sin(eta), mate.fillet_centre_radius * np.cos(eta)
         line_distance(side, -r * ce - rc, -r * se - rs, r * se, -r * ce, rs, -rc, zeta)
         distance_gap(side, strip, j, tip, -1.0, mate.fillet_radius - corner.rounding[0], want)
@@ -164,6 +168,7 @@ def root_part(options, wheels, scratch, part, tip, f_tip, f_root, totals, want):
     if not root_sections(options, wheels, scratch, part, tip, f_tip, f_root, want):
         return 0.0
     slices, loads, sums, pair = options.slices, scratch.loads, scratch.sums, scratch.pair
+    # over an arc its force stands for those of the circle below and of the flank's extension, which are subtracted
     share = -1.0 if part == ON_FLANK or part == UNDER_ARC else 1.0
     law = law_of(options, wheels, 1.0)
     if part != ON_CIRCLE:
@@ -207,6 +212,7 @@ def root_contacts(options, wheels, scratch, sign, totals, want):
         place_tip, place_root = (L.F1, L.F2) if tip == 1 else (L.F2, L.F1)
         turn_1 = 2.0 * np.pi / options.teeth[0]
         pitch_tip, pitch_root = (turn_1, side.turn_2) if tip == 1 else (side.turn_2, turn_1)
+        # the tip next to the line of centres
         middle = -np.floor(side.x[place_tip] / pitch_tip + 0.5)
         for k in range(-NEIGHBOURS, NEIGHBOURS + 1):
             f_tip = side.x[place_tip] + (middle + k) * pitch_tip

@@ -45,6 +45,7 @@ class GapCurvatures(NamedTuple):
 @inlined
 def turned(sa, ca, step):
     """Sine and cosine of an angle turned by a small step."""
+    # Taylor's series of cosine and sine, to rounding up to `LARGEST_TURN`
     d2 = step * step
     c = 1.0 - d2 * (0.5 - d2 * (1.0 / 24.0 - d2 * (1.0 / 720.0 - d2 / 40320.0)))
     s = step * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0 - d2 * (1.0 / 5040.0 - d2 / 362880.0))))
@@ -72,6 +73,8 @@ def set_sections(strip, n, side, first, count, normal):
     low, width = side.low, side.step
     for j in range(n):
         zeta = low + (first + min(float(j), count - 1.0)) * width
+        # normals turn evenly along the face but for what Newton's method adds: d alpha / d zeta of the section in the
+        # middle
         step = slope * (zeta - middle)
         strip.zeta[j] = zeta
         strip.alpha[j] = alpha + step
@@ -135,13 +138,18 @@ def flank_normals(side, strip, n):
             i_k2 = 1.0 / (1.0 - B * B)
             i_k = np.sqrt(i_k2)
             zeta = strip.zeta[j]
+            # both flanks have one sum of lengths of roll, so that their support functions add to one of the base radius
+            # r_b1 + r_b2
             s = s0 + rb * (strip.alpha[j] + normal_turn(A, B, tilt))
+            # g = a sin - 2 A zeta / w - h: its first and second derivative by alpha, with dA/dalpha = B and dB/dalpha =
+            # -A
             g1 = a * ca - A * B * s * i_w * i_k - rb * i_k - 2.0 * B * zeta * i_w
             g2 = s * (A * A * i_w - B * B * w * i_k2) * i_k - a * sa + 2.0 * A * zeta * i_w
             step = -g1 / g2
             strip.alpha[j] += step
             strip.sin[j], strip.cos[j] = turned(sa, ca, step)
             strip.step[j] = step
+            # d alpha / d zeta = -g_alphazeta / g_alphaalpha, g_alphazeta = -2 B / w
             strip.rate[j] = 2.0 * B * i_w / g2
         squared = steps_squared(strip, n)
         if squared < NEWTON_END * NEWTON_END:
@@ -178,6 +186,7 @@ def flank_sections(side, strip, n, want):
         s1 = rb1 * (start_1 + turn)
         s2 = rb2 * (start_2 + turn)
         h = involute_slopes(A, B, kap, s1 + s2, rb, tilt)
+        # A / w by A and B at w^2 = 1 - A^2 - B^2: kappa^2 / w^3 and A B / w^3
         gA = -h.A - 2.0 * zeta * kap * kap * i_w3
         gB = -h.B - 2.0 * zeta * A * B * i_w3
         strip.roll_1[j] = s1
@@ -188,11 +197,13 @@ def flank_sections(side, strip, n, want):
         strip.grad[1, j] = 0.0
         strip.grad[2, j] = gA * sa + gB * ca
         strip.grad[3, j] = gA * ca - gB * sa
+        # h = kappa s / w, and s turns with each wheel by its base radius
         strip.grad[4, j] = -kap * i_w * rb1
         strip.grad[5, j] = -kap * i_w * rb2
     if want == 0:
         return
     i_w5 = tilt.i_w5
+    # of what a turn by r_b does each wheel does its share
     share_1, share_2 = rb1 / rb, rb2 / rb
     for j in range(n):
         sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
@@ -224,6 +235,7 @@ def flank_sections(side, strip, n, want):
 @inlined
 def put_curvatures(strip, j, sa, ca, c):
     """Fill the gap's Hessian and d alpha / dx of section ``j`` by eliminating alpha from second derivatives."""
+    # along stationary alpha g_xx - g_xalpha g_alphax / g_alphaalpha; e = d alpha / dx
     inverse = -1.0 / c.alpha_alpha
     d2 = c.alpha_A * sa + c.alpha_B * ca
     d3 = c.alpha_A * ca - c.alpha_B * sa
@@ -241,6 +253,7 @@ def put_curvatures(strip, j, sa, ca, c):
     hess[0, 3, j] = d3 * e0
     hess[0, 4, j] = d4 * e0
     hess[0, 5, j] = d5 * e0
+    # A and B turn with alpha: p and q are A sin + B cos and A cos - B sin
     hess[2, 2, j] = d2 * e2 + c.AA * sa * sa + 2.0 * c.AB * sa * ca + c.BB * ca * ca
     hess[2, 3, j] = d3 * e2 + (c.AA - c.BB) * sa * ca + c.AB * (ca * ca - sa * sa)
     hess[2, 4, j] = d4 * e2 + c.AF1 * sa + c.BF1 * ca
@@ -266,6 +279,7 @@ def gap_rates(side, strip, n, want):
     x0, x1, x2, x3, x4, x5 = xd[0], xd[1], xd[2], xd[3], xd[4], xd[5]
     grad = strip.grad
     for j in range(n):
+        # g' = g_x . x', whose derivatives by x are g_xx x'
         strip.rate[j] = (
             grad[0, j] * x0 + grad[1, j] * x1 + grad[2, j] * x2 + grad[3, j] * x3 + grad[4, j] * x4 + grad[5, j] * x5
         )

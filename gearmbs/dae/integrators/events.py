@@ -85,6 +85,7 @@ def _root(functions, st, part, which, a, fa, b, fb):
     for k in range(ROOT_ITERATIONS):
         if fb == 0.0 or abs(b - a) <= ROOT_EPS * max(abs(a), abs(b)):
             break
+        # secant through both ends
         t = b - fb * (b - a) / (fb - fa)
         if k >= SECANTS or not (min(a, b) < t < max(a, b)):
             t = 0.5 * (a + b)
@@ -98,6 +99,7 @@ def _root(functions, st, part, which, a, fa, b, fb):
         if (f > 0.0) == (fb > 0.0):
             b = t
             fb = f
+            # Illinois: an end that stays twice has its value halved, so that the secant passes it
             if side == 1:
                 fa *= 0.5
             side = 1
@@ -146,6 +148,7 @@ def _sample(functions, st, part):
                 low = min(low, g[i, e])
                 high = max(high, g[i, e])
             for i in range(half, SAMPLES, stride):
+                # how far the sample in the middle is off the chord
                 off = max(off, abs(g[i, e] - 0.5 * (g[i - half, e] + g[i + half, e])))
             straight &= off <= STRAIGHT * (high - low)
         stride = half
@@ -175,10 +178,12 @@ def _turn_beyond_zero(functions, st, part, which, first, last):
         return np.nan
     sign = 1.0 if first > 0.0 else -1.0
     near = 1.0 / SAMPLES
+    # slopes at both ends, and where their tangents meet
     falls = sign * (_value_at(functions, st, part, which, near) - first) / near
     rises = sign * (last - _value_at(functions, st, part, which, 1.0 - near)) / near
     if not (falls < 0.0 and rises > 0.0):
         return np.nan
+    # first + falls x = last + rises (x - 1)
     meet = (sign * (last - first) - rises) / (falls - rises)
     if sign * first + falls * meet > 0.0:
         return np.nan
@@ -193,6 +198,7 @@ def _turn_beyond_zero(functions, st, part, which, first, last):
             return one
         if at_two < 0.0:
             return two
+        # golden section: the least value is on the side of the smaller of two
         if at_one < at_two:
             high, two, at_two = two, one, at_one
             one = high - GOLDEN_FRACTION * (high - low)

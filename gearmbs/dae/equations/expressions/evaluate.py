@@ -68,6 +68,7 @@ def _leaf_value(ints, at, kin, acc, marker_body, marker_frame, y, w):
     if code == op.COSINE:
         marker_axis(ints[at + 1], ints[at + 2], kin, marker_body, marker_frame, w, AXIS)
         marker_axis(ints[at + 3], ints[at + 4], kin, marker_body, marker_frame, w, VECTOR)
+        # cosine of the angle between two axes
         return w[AXIS] * w[VECTOR] + w[AXIS + 1] * w[VECTOR + 1] + w[AXIS + 2] * w[VECTOR + 2]
     if code == op.RADIAL_VELOCITY:
         return radial_velocity(ints[at + 1], ints[at + 2], kin, marker_body, marker_frame, w)
@@ -130,6 +131,7 @@ def forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, 
     """
     n = ints[op.HEAD_COUNT]
     at = ints[op.HEAD_CODE]
+    # behind values, and first and second partials of each instruction by its one or two operands
     leaf = work[n * (1 if order == 0 else (3 if order == 1 else 6)) :]
     for k in range(n):
         code = ints[at]
@@ -148,6 +150,7 @@ def forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, 
                 d = (integral(ints, floats, t, ints[at + 1], ints[at + 2], scratch), 0.0, 0.0)
             else:
                 d = unary(code, a, float(ints[at + 2]))
+            # f(a): value, f_a, f_aa; of a second operand there is nothing
             work[k] = d[0]
             if order > 0:
                 work[n + k] = d[1]
@@ -162,6 +165,7 @@ def forward(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, work, 
                 e = spline_value(floats, ints[at + 3], ints[at + 4], a, b)
             else:
                 e = binary(code, a, b)
+            # f(a, b): value, f_a, f_b, f_aa, f_ab, f_bb
             work[k] = e[0]
             if order > 0:
                 work[n + k] = e[1]
@@ -185,6 +189,7 @@ def backward(ints, work, adjoint, result):
         work[adjoint + k] = 0.0
     work[adjoint + result] = 1.0
     for k in range(n - 1, -1, -1):
+        # adjoint of k: derivative of the result by it, complete as all that use it come later on the tape
         g = work[adjoint + k]
         if g == 0.0:
             continue
@@ -196,10 +201,13 @@ def backward(ints, work, adjoint, result):
             work[adjoint + selected(ints, at, work)] += g
             continue
         if code == op.EXTERNAL:
+            # behind the value of a function of the user stand its partials
             partials = work.size - ints[op.HEAD_EXTERNAL] + ints[at + 3] + ints[at + 2] + 1
             for i in range(ints[at + 2]):
                 work[adjoint + ints[ints[at + 1] + i]] += g * work[partials + i]
             continue
+        # an operand's adjoint gains that of the instruction times f_a; infinite partials of what does not count are
+        # left out
         if work[n + k] != 0.0:
             work[adjoint + ints[at + 1]] += g * work[n + k]
         if code >= op.FIRST_BINARY and work[2 * n + k] != 0.0:
@@ -265,6 +273,7 @@ def eval_request(ints, floats, t, kin, acc, marker_body, marker_frame, y, ref, w
 def _scatter(ints, kin, marker_body, marker_frame, y, grad, work):
     """Write the gradient from the leaves' adjoints, which stand at work[3 n:]."""
     n = ints[op.HEAD_COUNT]
+    # variations of the bodies come first, then unknowns
     first = 12 * ints[op.HEAD_BODIES]
     for c in range(first + ints[op.HEAD_ALGEBRAIC]):
         grad[c] = 0.0

@@ -45,8 +45,10 @@ def _combine_rows(ints, at, k, n, work, rows):
     if ints[at] == op.INTEGRAL:
         for q in range(columns):
             rows[k, q] = 0.0
+        # an integral over time has its integrand for its rate, and no other derivative
         rows[k, columns - 1] = work[a]
         return
+    # chain rule: grad f = f_a grad a + f_b grad b
     pa = work[count + k]
     for q in range(columns):
         rows[k, q] = pa * rows[a, q] if rows[a, q] != 0.0 else 0.0
@@ -84,6 +86,7 @@ def _curvature(ints, at, k, weight, work, rows, hess):
     if ints[at] == op.EXTERNAL:
         _external_curvature(ints, at, weight, work, rows, hess)
         return
+    # f_aa grad a grad a^T + f_bb grad b grad b^T + f_ab (grad a grad b^T + grad b grad a^T)
     aa, ab, bb = work[3 * count + k], work[4 * count + k], work[5 * count + k]
     if ints[at] == op.INTEGRAL:
         last = rows.shape[1] - 1
