@@ -500,7 +500,6 @@ def choose_pivots(indptr, indices, scaled, drop, threshold, columns, rows):
             top[j] = max(top[j], abs(scaled[p]))
     peak = top.copy()
     largest = max(np.max(peak), TINY)
-    # the first column comes first among those of equal length
     for m in range(n - 1, -1, -1):
         _link(m, columns.length[m], columns.head, columns.after, columns.before)
         _link(m, rows.length[m], rows.head, rows.after, rows.before)
