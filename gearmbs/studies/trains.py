@@ -60,7 +60,7 @@ def load_train(path: str | Path) -> Description:
     Parameters
     ----------
     path : path-like
-        A file, or the name of a preset: bench, crank_slider, gearbox, nrel_5mw, rattle or resonance.
+        A file, or the name of a preset: bench, crank_slider, gearbox, grc_750kw, nrel_5mw, rattle or resonance.
 
     Raises
     ------

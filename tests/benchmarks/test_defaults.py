@@ -17,8 +17,8 @@ def test_the_former_default_takes_the_place_of_any_law():
 @pytest.mark.slow
 def test_presets_that_state_their_law_are_moved_by_no_default():
     reached = {row[0] for name in PRESETS for row in mesh_rows(name, preset_train(name)) if row[2] == "default"}
-    # one that is meant to have the law of its own wheels, and one that came after the default
-    assert reached == {"crank_slider", "nrel_5mw"}
+    # one that is meant to have the law of its own wheels, and two that came after the default
+    assert reached == {"crank_slider", "grc_750kw", "nrel_5mw"}
     for name, mesh, stated, before, now in mesh_rows("two stages", two_stages()):
         assert (name, stated) == ("two stages", "default")
         # IMPACT damps with half of the critical and more, the law of the wheels themselves with some hundredths

@@ -129,7 +129,7 @@ def test_points_without_a_mass_may_have_no_shapes(tmp_path):
     shapes[0, :, 0] = np.cos(np.arange(5) * np.pi / 4) / np.sqrt(2.25 * 2.0)
     writer.modes(np.arange(1, 6), shapes, np.array([100.0]), np.ones(1))
     assert read_op2_modes(writer.write(tmp_path / "a.op2")).ids.tolist() == [1, 2, 3, 4, 5]
-    with pytest.raises(FlexibleError, match=says("point 2", "all")):
+    with pytest.raises(FlexibleError, match=says("OUGV1", "2", "all points")):
         read_op2_modes(chain(tmp_path / "b.op2", without=(2,))[0])
 
 

@@ -56,6 +56,17 @@ def test_ratios_and_frequencies(train):
     assert [round(f, 2) for f in meshes.values()] == [11.29, 74.03, 466.35]
 
 
+def test_the_gearbox_of_750_kw_has_its_published_ratio():
+    """81.491 = (1 + 99/21) 82/23 88/22; meshes by their teeth at 22 rpm; power of 750 kW passes."""
+    other = load_train("grc_750kw").train
+    table = other.kinematics
+    assert table.ratio("high", "rotor") == pytest.approx(81.491, rel=1e-5)
+    found = [table.mesh_frequency(name) for name in ("first", "second", "third")]
+    turns = 22.0 / 60.0
+    assert found == pytest.approx([99 * turns, 82 * turns * 40 / 7, 88 * turns * 40 / 7 * 82 / 23])
+    assert other.power.drive["wind"] * 2.0 * math.pi * turns == pytest.approx(750e3, rel=1e-4)
+
+
 @pytest.mark.parametrize("mesh", TIPS)
 def test_wheels(train, mesh):
     pair = train.pairs[mesh]

@@ -153,7 +153,15 @@ def again(thing: Drivetrain | Description) -> Description:
 
 @pytest.mark.parametrize(
     "name",
-    ["bench", "crank_slider", "gearbox", "rattle", "resonance", pytest.param("nrel_5mw", marks=pytest.mark.slow)],
+    [
+        "bench",
+        "crank_slider",
+        "gearbox",
+        "grc_750kw",
+        "rattle",
+        "resonance",
+        pytest.param("nrel_5mw", marks=pytest.mark.slow),
+    ],
 )
 def test_files_of_the_package_come_back_equal(name):
     told = read_description(FOLDER / f"{name}.toml", tooth_fault)

@@ -16,7 +16,7 @@ from gearmbs.schema.described import read_toml
 
 FOLDER = Path(__file__).parent
 """Where the files are."""
-PRESETS = ("bench", "crank_slider", "gearbox", "nrel_5mw", "rattle", "resonance")
+PRESETS = ("bench", "crank_slider", "gearbox", "grc_750kw", "nrel_5mw", "rattle", "resonance")
 
 
 @cache
