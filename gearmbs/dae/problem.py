@@ -249,6 +249,29 @@ class Counted(NamedTuple):
         return found
 
 
+class Alone(NamedTuple):
+    """The equations of one element alone, or what it adds to some, for numbers that enter nothing else.
+
+    Attributes
+    ----------
+    residual : compiled function
+        As that of the problem, which has just been called at the same place; it writes the equations of one element.
+    place, rest : int
+        Where in ``idata`` the number of the element stands, and what stands there otherwise.
+    sums : int
+        Number from which on the residual is what an element adds to equations in which there is more.
+    owners : callable
+        ``owners(places)`` returns the elements whose equations alone the numbers at places of ``rdata`` enter, each
+        with the places of these equations, or None if they enter others, too.
+    """
+
+    residual: Callable
+    place: int
+    rest: int
+    sums: int
+    owners: Callable[[np.ndarray], list[tuple[int, np.ndarray]] | None]
+
+
 @dataclass
 class DAEProblem:
     """A DAE G(t, y, y') = 0 with everything an integrator needs to know about it.
@@ -284,6 +307,10 @@ class DAEProblem:
         and so does what it asks of them. Default: none.
     nonlinear_rates : bool
         Whether G is not linear in y': the corrector then trusts no rate of convergence that it has not seen itself.
+    constant_slopes : bool
+        Whether dG/dy' is the same everywhere.
+    alone : Alone, optional
+        The equations of single elements.
     start_note : str
         What to say of the initial values in the message of a run that succeeds.
     names : list of str
@@ -346,6 +373,8 @@ class DAEProblem:
     continuous: np.ndarray | None = None
     index_one: np.ndarray | None = None
     nonlinear_rates: bool = False
+    constant_slopes: bool = False
+    alone: Alone | None = None
     start_note: str = ""
     names: list[str] = field(default_factory=list)
     hook: Callable | None = None

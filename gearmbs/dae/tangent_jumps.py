@@ -14,7 +14,7 @@ import numpy as np
 from gearmbs.dae.linalg.sparse_lu import solve
 from gearmbs.dae.problem import EPS
 from gearmbs.dae.result import lagrange_weights
-from gearmbs.dae.tangent_track import MOST, slot_of
+from gearmbs.dae.tangent_track import MOST, lane_of, slot_of
 from gearmbs.kernels.jit import njit
 
 SEEN = 1e-5
@@ -24,6 +24,10 @@ ROUNDED = 1e3
 """Roundings of a typical unknown, times gamma, that a rate is not told from: residuals are sums of many terms."""
 APART = 8.0
 """Roundings of a time between two that count as the same: an expression may jump at another sum than a breakpoint."""
+NODES = 5
+"""Points of an interval: their fourth difference is looked at."""
+DEEP = 128
+"""Intervals that wait at once: halved until rounding, each leaves one beside it."""
 LOOKS = 4096
 """Intervals of a step that are looked at: a smooth residual is through with a few, a jump in it with a hundred."""
 SMALLER, MOVES = 1e-2, 6
@@ -48,16 +52,21 @@ def _residual(functions, tr, k, t, yp, p, by, idata, rdata, work):
     by : float
         By how much of its scale; unknowns move along its sensitivities.
     """
-    n, count = tr.scale.shape[0], tr.parameters
+    n = tr.scale.shape[0]
     lagrange_weights(t, tr.times, k + 1, tr.value, tr.slope)
-    for i in range(n):
-        v = 0.0
+    between, history = tr.between, tr.y
+    for j in range(k + 1):
+        weight = tr.value[j]
+        if j == 0:
+            for i in range(n):
+                between[i] = weight * history[0, i]
+            continue
+        for i in range(n):
+            between[i] += weight * history[j, i]
+    if by != 0.0:
         for j in range(k + 1):
-            v += tr.value[j] * tr.y[j, i]
-        if by != 0.0:
-            for j in range(k + 1):
-                v += tr.value[j] * by * tr.s[slot_of(tr, j) * count + p, i]
-        tr.between[i] = v
+            for i in range(n):
+                between[i] += tr.value[j] * by * tr.s[lane_of(tr, j, p, i)]
     first, last = tr.first[p], tr.first[p + 1]
     if by != 0.0:
         for q in range(first, last):
@@ -93,13 +102,77 @@ def _size(tr, i, moved):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _differs(tr, plan, factors):
+    """Return whether the fourth difference of the residual, in ``tr.last_seen``, is more than what is looked at."""
+    found, rates, scale, watched = tr.first_seen, tr.most_rate, tr.scale, tr.watched
+    solve(plan, factors, tr.last_seen, found)
+    gamma, rounded, seen = tr.gamma, ROUNDED * EPS * tr.gamma, False
+    for i in range(scale.shape[0]):
+        seen |= watched[i] * abs(gamma * found[i]) > SEEN * rates[i] + rounded * scale[i]
+    return seen
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _seen_at_nodes(functions, tr, plan, factors, k, steps, yp, idata, rdata, work):
+    """Return whether there may be a jump, by a fourth difference over the ends of steps and few points between them.
+
+    At an end the residual is known, but for the rates: those of the newest point are taken at all. So three steps take
+    one evaluation, in the middle of the widest. Points stand at uneven distances; a jump between any two counts fully.
+
+    Parameters
+    ----------
+    functions, tr, plan, factors, k, steps, yp, idata, rdata, work
+        As of `look_for_jumps`.
+    """
+    n, difference = tr.scale.shape[0], tr.last_seen
+    nodes, weights, ends = np.empty(NODES), np.empty(NODES), np.empty(NODES, dtype=np.int64)
+    for q in range(steps + 1):
+        nodes[q], ends[q] = tr.times[q], q
+    for count in range(steps + 1, NODES):
+        # in the middle of the widest interval
+        widest = 0
+        for q in range(count - 1):
+            if nodes[q] - nodes[q + 1] > nodes[widest] - nodes[widest + 1]:
+                widest = q
+        for q in range(count, widest + 1, -1):
+            nodes[q], ends[q] = nodes[q - 1], ends[q - 1]
+        nodes[widest + 1], ends[widest + 1] = 0.5 * (nodes[widest] + nodes[widest + 2]), -1
+    # what all points behind a jump add up to
+    total, least = 0.0, np.inf
+    for q in range(NODES):
+        weights[q] = 1.0
+        for m in range(NODES):
+            if m != q:
+                weights[q] *= (nodes[0] - nodes[NODES - 1]) / (nodes[q] - nodes[m])
+        total += weights[q]
+        if q < NODES - 1:
+            least = min(least, abs(total))
+    for i in range(n):
+        difference[i], tr.found[i] = 0.0, 0.0
+    for q in range(NODES):
+        w = weights[q] / least
+        if ends[q] >= 0:
+            slot = slot_of(tr, ends[q])
+            for i in range(n):
+                difference[i] += w * tr.left[slot, i]
+                tr.found[i] += w * (yp[i] - tr.rates[slot, i])
+        else:
+            _residual(functions, tr, k, nodes[q], yp, 0, 0.0, idata, rdata, work)
+            for i in range(n):
+                difference[i] += w * tr.plus[i]
+    for q in range(tr.slope_row.shape[0]):
+        difference[tr.slope_row[q]] += tr.slope_value[q] * tr.found[tr.slope_col[q]]
+    return _differs(tr, plan, factors)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def look_for_jumps(functions, tr, plan, factors, k, steps, yp, idata, rdata, work):
     """Look for jumps in the last steps, to the newest point, and note what each moves the sensitivities by.
 
     Parameters
     ----------
     functions, tr, plan, factors
-        As of `gearmbs.dae.tangents.follow_run`, with the newest point in the history.
+        As of `gearmbs.dae.tangent_steps.follow_run`, with the newest point in the history.
     k : int
         Order of the polynomial.
     steps : int
@@ -110,38 +183,48 @@ def look_for_jumps(functions, tr, plan, factors, k, steps, yp, idata, rdata, wor
         Tables and scratch of the problem.
     """
     n = tr.scale.shape[0]
-    difference, found = tr.last_seen, tr.first_seen
+    difference, seen, stack = tr.last_seen, tr.looked_at, tr.stack
     for i in range(n):
         tr.most_rate[i] = max(tr.most_rate[i], abs(yp[i]))
+    by_ends = tr.constant_slopes and tr.known > steps
+    if by_ends:
+        if not _seen_at_nodes(functions, tr, plan, factors, k, steps, yp, idata, rdata, work):
+            return
     # a jump right at the end belongs to the step behind it, one right at the start to these
-    lows, highs = np.empty(LOOKS + 2), np.empty(LOOKS + 2)
+    lows, highs = np.empty(DEEP), np.empty(DEEP)
     lows[0] = tr.times[steps] - APART * EPS * abs(tr.times[steps])
     highs[0] = tr.times[0] - APART * EPS * abs(tr.times[0])
     waiting, looks = 1, 0
     while waiting > 0 and looks < LOOKS:
         waiting -= 1
-        looks += 1
         low, high = lows[waiting], highs[waiting]
+        for j in range(NODES):
+            if looks > 0 and j % 2 == 0:
+                for i in range(n):
+                    seen[j, i] = stack[3 * waiting + j // 2, i]
+            else:
+                _residual(functions, tr, k, low + 0.25 * j * (high - low), yp, 0, 0.0, idata, rdata, work)
+                for i in range(n):
+                    seen[j, i] = tr.plus[i]
+        looks += 1
         for i in range(n):
-            difference[i] = 0.0
-        for j in range(5):
-            _residual(functions, tr, k, low + 0.25 * j * (high - low), yp, 0, 0.0, idata, rdata, work)
-            weight = 6.0 if j == 2 else -4.0 if j % 2 else 1.0
-            for i in range(n):
-                difference[i] += weight * tr.plus[i]
-        solve(plan, factors, difference, found)
-        most = 0.0
-        for i in range(n):
-            most = max(most, _size(tr, i, found[i]))
-        if most <= 1.0:
+            difference[i] = seen[0, i] - 4.0 * seen[1, i] + 6.0 * seen[2, i] - 4.0 * seen[3, i] + seen[4, i]
+        if not _differs(tr, plan, factors):
             continue
-        if high - low <= APART * EPS * abs(high):
+        if high - low <= APART * EPS * abs(high) or waiting + 2 > DEEP:
             _note(functions, tr, plan, factors, k, yp, low, high, idata, rdata, work)
             continue
         middle = low + 0.5 * (high - low)
         lows[waiting], highs[waiting] = low, middle
         lows[waiting + 1], highs[waiting + 1] = middle, high
+        for j in range(3):
+            for i in range(n):
+                stack[3 * waiting + j, i] = seen[j, i]
+                stack[3 * (waiting + 1) + j, i] = seen[j + 2, i]
         waiting += 2
+    if by_ends and looks == 1:
+        # what was seen over the ends of the steps and not between them is right at the last, of the step behind it
+        tr.known = 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

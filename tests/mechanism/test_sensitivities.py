@@ -339,3 +339,65 @@ def test_divided_steps_go_through_changes_of_angles(asked):
 def test_a_local_error_that_is_not_positive_is_refused():
     with pytest.raises(ModelError, match=says("local_error", "0", "positive")):
         forward_sensitivities(oscillator, VALUES, 1.0, local_error=0.0)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("place", ["start", "anchor"])
+def test_a_scale_below_the_roundings_of_what_is_added_to_is_made_larger(scale, place):
+    """A mass at 1 m on a spring of 50/s^2 and a damper, moved with its start or with the spring's anchor."""
+
+    def sprung(offset, speed):
+        made = gm.Mechanism("sprung")
+        at = 1.0 + (offset if place == "start" else 0.0)
+        body = made.body("body", mass=2.0, inertia=(1, 1, 1), position=(at, 0, 0), velocity=(speed, 0, 0))
+        made.translational("slide", body, made.ground, at=(0, 0, 0), axis=(1, 0, 0))
+        anchor = 1.2 + (offset if place == "anchor" else 0.0)
+        made.ground.marker((anchor, 0, 0), name="J")
+        made.load("spring", body.marker(name="I"), made.ground.marker(name="O"), fx="-100*DX(I,J)-0.3*VX(I,J)")
+        return made
+
+    run = forward_sensitivities(sprung, {"offset": (0.0, scale), "speed": (0.0, scale)}, 1.0, rate=10)
+    d = 0.075
+    w = np.sqrt(50.0 - d * d)
+    by_start = np.exp(-d) * (np.cos(w) + d / w * np.sin(w))
+    exact = {"offset": by_start if place == "start" else 1.0 - by_start, "speed": np.exp(-d) * np.sin(w) / w}
+    for name, value in exact.items():
+        assert run.derivative(name, lambda s: s.com_position("body")[-1, 0]) == pytest.approx(value, rel=2e-5)
+
+
+@pytest.mark.slow
+def test_lengths_of_teeth_that_just_touch():
+    """By the module, which moves flanks a thousand times as far as they are deep in each other, from rest on.
+
+    Differences of runs 1e-5 to either side of it; 1e-4 apart they are the same to 1.4e-4.
+    """
+    case = Case(operation={"speed": "1000 rpm", "torque": 100.0, "run_up": 0.005, "settling": 0.0, "duration": 0.01})
+    module, settings = 0.0030645, {"rate": 20_000, "rate_scale": 2000.0}
+
+    def geared(module):
+        return case_mechanism(case.changed(gears={"module": module}))
+
+    def force(solution):
+        return solution.contact("mesh")["normal_force"]
+
+    run = forward_sensitivities(geared, {"module": module}, 0.006, tol=1e-10, **settings)
+    above, below = (force(geared(module * f).simulate(0.006, tol=1e-12, **settings)) for f in (1.00001, 0.99999))
+    expected = (above - below) / 2e-5 / module
+    found = run.derivative("module", force)
+    assert np.sqrt(np.mean((found - expected) ** 2)) < 1e-3 * np.sqrt(np.mean(expected**2))
+
+
+def test_limits_that_are_infinite_say_nothing_of_a_parameter(recwarn):
+    """Friction brings a sliding mass to rest: by its coefficient the way is that of -mu g t^2 / 2; it has no limit."""
+
+    def sliding(mu):
+        made = gm.Mechanism("sliding", gravity=(0, 0, -9.81))
+        body = made.body("body", mass=1.0, inertia=(1, 1, 1), velocity=(3, 0, 0))
+        rail = made.translational("rail", body, made.ground, at=(0, 0, 0), axis=(1, 0, 0))
+        made.friction("friction", rail, 1.3 * mu, mu)
+        return made
+
+    run = forward_sensitivities(sliding, {"mu": 0.2}, 0.5, rate=20)
+    assert not recwarn.list
+    way = run.derivative("mu", lambda s: s.com_position("body")[:, 0])
+    assert way == pytest.approx(-9.81 * run.solution.t**2 / 2, rel=1e-3, abs=1e-6)

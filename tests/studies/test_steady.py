@@ -83,14 +83,16 @@ def test_forces_without_jumps_are_not_looked_through_before_multipliers_are_aske
 
     monkeypatch.setattr(orbits, "follow", counted)
     motion = gm.steady(Case(operation={"speed": "3000 rpm", "torque": 20.0}), variables=["gmf_rms"])
-    assert looked == [False]
+    before = len(looked)
+    assert before > 0
+    assert not any(looked)
     told = motion.record.attrs["orbit_multiplier"]
     assert told == pytest.approx(abs(motion.multipliers[0]), rel=0.02)
-    assert looked == [False, True]
+    assert looked[before:] == [True]
     # teeth with faults may have corners at which forces jump
     broken = Case(operation={"speed": "1000 rpm", "torque": 20.0}, fault={"teeth": "broken tooth"})
     gm.steady(broken, variables=["gmf_rms"])
-    assert looked[2:].count(True) == 1
+    assert looked[before + 1 :].count(True) == 1
 
 
 @pytest.mark.parametrize("rpm", [650, 700, 1200, 1375, 1600])

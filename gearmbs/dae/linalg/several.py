@@ -5,44 +5,45 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
+from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.schedule import has_nodes
-from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
+from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.lanes import LANES, lanes_at, put_lanes
+from gearmbs.kernels.lanes import lanes_at, put_lanes
+from gearmbs.kernels.pointers import direct
 
-SIDES = LANES
-"""Right-hand sides at a time. Of a pair's 115 unknowns eight take as long as two would one after the other."""
+
+def has_lanes(plan: LUPlan) -> bool:
+    """Return whether a plan can be gone through for several sides at once: it has no nodes and no dense tail."""
+    return not direct(has_nodes)(plan.node_end) and plan.tail == plan.row_from.shape[0]
 
 
 @njit(
-    types.void(PLAN_TYPE, FACTORS_TYPE, types.Array(types.float64, 2, "C"), types.float64[::1]),
+    types.void(PLAN_TYPE, FACTORS_TYPE, types.float64[::1], types.int64, types.float64[::1]),
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
-def solve_sides(plan, factors, sides, x):
-    """Solve for `SIDES` right-hand sides at once, which are overwritten by the solutions.
+def solve_lanes(plan, factors, sides, first, x):
+    """Solve for `LANES` right-hand sides at once, which are overwritten by the solutions.
+
+    Of a pair's 115 unknowns they take as long as two would one after the other.
 
     Parameters
     ----------
     plan : LUPlan
-        Those with nodes or a dense tail are solved one after the other.
+        One that `has_lanes`.
     factors : LUFactors
         From `factor`.
-    sides : ndarray, shape (SIDES, n)
-    x : ndarray, shape (n SIDES,)
+    sides : ndarray
+        Lanes of each equation, from place ``first`` of the table on.
+    first : int
+    x : ndarray, shape (n LANES,)
         Scratch.
     """
     lu, pivot_inv = factors.lu, factors.pivot_inv
     n = pivot_inv.shape[0]
-    if has_nodes(plan.node_end) or plan.tail < n:
-        for m in range(SIDES):
-            solve(plan, factors, sides[m], sides[m])
-        return
     l_to, l_by, u_to, u_by = plan.l_to, plan.l_by, plan.u_to, plan.u_by
     for k in range(n):
-        row, size, to = plan.row_from[k], plan.row_scale[k], SIDES * k
-        for m in range(SIDES):
-            x[to + m] = sides[m, row] * size
+        put_lanes(x, k, lanes_at(sides, first + plan.row_from[k]) * plan.row_scale[k])
     for q in range(l_to.shape[0]):
         to = l_to[q]
         put_lanes(x, to, lanes_at(x, to) - lu[q] * lanes_at(x, l_by[q]))
@@ -51,6 +52,4 @@ def solve_sides(plan, factors, sides, x):
         to, k = u_to[p], u_by[p]
         put_lanes(x, to, lanes_at(x, to) - (lu[upper + p] * pivot_inv[k]) * lanes_at(x, k))
     for k in range(n):
-        size, to, at = pivot_inv[k] * plan.col_scale[k], plan.col_to[k], SIDES * k
-        for m in range(SIDES):
-            sides[m, to] = x[at + m] * size
+        put_lanes(sides, first + plan.col_to[k], lanes_at(x, k) * (pivot_inv[k] * plan.col_scale[k]))

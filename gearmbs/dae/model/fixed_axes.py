@@ -189,6 +189,7 @@ def fixed_axis_problem(system: System, axes: Sequence[Axis], rate_scale: float) 
         scale=scale,
         differential=differential,
         t0=system.t0,
+        constant_slopes=True,
         names=[*names, *(f"z({name})" for name in system.state_names)],
         solved_at_outputs=~mask & ~differential,
         finite_rates=model.has_finite_forces,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from gearmbs.dae.equations import jacobian, residual, unknowns
+from gearmbs.dae.equations import elements, jacobian, residual, unknowns
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.body import turning_rates
 from gearmbs.dae.equations.constraints.terms import ANGLE
@@ -204,6 +204,8 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
         continuous=unknowns.given_by_momenta(at, form),
         t0=system.t0,
         index_one=index_one if index_one.any() else None,
+        constant_slopes=not multipliers_stand_as_rates(form),
+        alone=elements.alone(idata),
         names=[unknown.name for unknown in model.unknowns(formulation)],
         hook=hook,
         hook_interval=_hook_interval(model, at),

@@ -24,6 +24,7 @@ from gearmbs.mechanism.solve.accuracy import chosen_accuracy
 from gearmbs.mechanism.solve.orbits import SteadyMotion, harmonics_of, steady_motion
 from gearmbs.mechanism.solve.sensitivities import (
     Sensitivities,
+    beside_each_other,
     built,
     check_functions,
     direction_of,
@@ -168,9 +169,9 @@ def derived_motion(
 
     directions = []
     for key, value in values.items():
+        scales[key], plus, minus = beside_each_other(key, value, scales[key], made)
         by = MOST * scales[key]
-        plus, minus = made(key, value + by)[1], made(key, value - by)[1]
-        directions.append(direction_of(key, own, plus, minus, 2.0 * by / scales[key]))
+        directions.append(direction_of(key, own, plus, minus, 2.0 * MOST))
         try:
             check_repeats(placed(plus), orbit.period, orbit.advance, orbit.result)
         except ModelError as error:

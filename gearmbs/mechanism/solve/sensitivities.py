@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
-from gearmbs.dae.problem import DAEProblem, ModelError
+from gearmbs.dae.problem import EPS, DAEProblem, ModelError
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.tangent_track import MOST, MOVED
 from gearmbs.dae.tangents import Direction, Followed, follow
@@ -36,6 +36,15 @@ if TYPE_CHECKING:
 TIGHTER = 0.1
 """Part of the usual tolerance at which a run is differentiated where none is given. Derivatives bend where the rates of
 the run do, and are as accurate as the unknowns at ten times the tolerance (docs/theory/tangents.md)."""
+RESOLVED = 2e10
+"""Roundings by which what a parameter moves is moved at least where the models beside each other are made: `BY` moves
+it by 2e4 times less, whose error is a millionth then."""
+SURELY = 16.0
+"""Roundings of a number up to which it may have been moved by nothing else."""
+LESS_OF_SCALE = 0.1
+"""Part of a given scale by which numbers that are zero are moved at most."""
+WIDENINGS, FARTHEST = 4, 1e6
+"""How often, and by how much at a time, models are made farther apart."""
 LARGEST_COUNT = 2**32
 """Above it integers of the tables are addresses; counts and places stay far below."""
 WITHOUT = ("every_step", "consumer", "watch", "stops", "initial", "inputs", "continued", "dense_output")
@@ -141,7 +150,8 @@ def forward_sensitivities(
     build : callable
         ``build(**parameters)`` returns the mechanism; it has to have the same parts whatever the values.
     parameters : mapping
-        Names and values, numbers in SI. A pair ``(value, scale)`` where the value is zero, or says nothing of its size.
+        Names and values, numbers in SI. A pair ``(value, scale)`` where the value is zero, or says nothing of its size;
+        a scale below the roundings of what the parameter is added to is made larger.
     t_end : float
         End of the simulation, s.
     t_start, formulation, rate_scale, lump, **options
@@ -164,8 +174,8 @@ def forward_sensitivities(
 
     Notes
     -----
-    Of S parameters the cost beside the run is that of a Jacobian and a factorisation, and of S + 1 residuals and
-    S substitutions, and five residuals more by which jumps are looked for, for each step. With ``local_error`` it is
+    The cost beside the run is, for each step, that of a Jacobian, a factorisation and some two residuals, and for each
+    parameter that of what of the residual it enters and an eighth of some substitutions. With ``local_error`` it is
     that once more but for the jumps, and what is divided. Contact and friction here are continuous.
     """
     for option in WITHOUT:
@@ -197,9 +207,8 @@ def forward_sensitivities(
 
     directions = []
     for key, value in values.items():
-        by = MOST * scales[key]
-        plus, minus = made(key, value + by)[1], made(key, value - by)[1]
-        directions.append(direction_of(key, solution.problem, plus, minus, 2.0 * by / scales[key]))
+        scales[key], plus, minus = beside_each_other(key, value, scales[key], made)
+        directions.append(direction_of(key, solution.problem, plus, minus, 2.0 * MOST))
     followed: Followed = follow(solution.problem, solution.result, directions, local_error=local_error)
     unknowns = {key: followed.s[p] / scales[key] for p, key in enumerate(values)}
     rates = {key: followed.sp[p] / scales[key] for p, key in enumerate(values)}
@@ -276,6 +285,42 @@ def _inside(element: Any) -> Any:
     return [repr(cell) for cell in plain if isinstance(cell, (int, float, list, tuple))]
 
 
+def beside_each_other(
+    name: str, value: float, scale: float, made: Callable[[str, float], tuple[Any, DAEProblem, Any, str]]
+) -> tuple[float, DAEProblem, DAEProblem]:
+    """Return the scale of a parameter, and the problems a part of it above and below the value.
+
+    The scale is the given one, or a larger one by which numbers of the model, or the start, are moved by more than
+    roundings of themselves: a place at 1 m that an offset of a micrometre is added to.
+    """
+    for _ in range(WIDENINGS):
+        plus, minus = made(name, value + MOST * scale)[1], made(name, value - MOST * scale)[1]
+        factor = _wider(plus, minus)
+        if factor <= 1.0:
+            break
+        scale *= factor
+    return scale, plus, minus
+
+
+def _wider(plus: DAEProblem, minus: DAEProblem) -> float:
+    """Return by how much farther apart two problems have to be so that what differs does by more than roundings."""
+    if plus.rdata.shape != minus.rdata.shape or plus.n != minus.n:
+        return 1.0
+    size = np.maximum(np.abs(plus.rdata), np.abs(minus.rdata))
+    moved = np.isfinite(size)
+    moved[moved] = np.abs(plus.rdata[moved] - minus.rdata[moved]) > SURELY * EPS * size[moved]
+    change = np.abs(plus.rdata[moved] - minus.rdata[moved])
+    if not moved.any():
+        change = np.abs(plus.y0 - minus.y0)
+        size = np.maximum(np.maximum(np.abs(plus.y0), np.abs(minus.y0)), plus.scale)
+        factor = RESOLVED * EPS / np.max(change / size, initial=0.0) if change.any() else 1.0
+        return float(min(factor, FARTHEST))
+    size = size[moved]
+    # what is zero at the value itself says nothing of how far it may go
+    least = np.min(np.where(2.0 * size > 1.5 * change, 2.0 * MOST * size / change, LESS_OF_SCALE / MOST))
+    return float(min(RESOLVED * EPS * np.max(size / change), least, FARTHEST))
+
+
 def direction_of(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEProblem, width: float) -> Direction:
     """Return how tables and start change by the scale of a parameter; refuse one that changes what there is."""
     for side in (plus, minus):
@@ -290,7 +335,11 @@ def direction_of(name: str, problem: DAEProblem, plus: DAEProblem, minus: DAEPro
                 "can be differentiated by it; take one that changes numbers only (in an expression 0 and 1 may vanish: "
                 "give m.parameter there)"
             )
-    change = (plus.rdata - minus.rdata) / width
+    differ = plus.rdata != minus.rdata
+    if not np.isfinite(plus.rdata[differ] - minus.rdata[differ]).all():
+        raise ModelError(f"parameter {name!r}: with it a number of the model becomes infinite, as a limit that goes")
+    change = np.zeros(differ.size)
+    change[differ] = (plus.rdata[differ] - minus.rdata[differ]) / width
     places = np.flatnonzero(change)
     start = (plus.y0 - minus.y0) / width
     if not places.size and not start.any():
