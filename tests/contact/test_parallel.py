@@ -1,5 +1,6 @@
 """The lean form of wheels on fixed parallel axes against the general one: wrench, derivatives, diagnostics."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -181,3 +182,16 @@ def test_what_the_lean_form_is_not_for():
         GearPair.paper(misalignment="1 deg"),
     ):
         assert Both(pair, rng).own is None
+
+
+def test_counts_of_references_are_behind_a_call_what_they_were_before():
+    """Kernels that count none hold nothing and let nothing go."""
+    both = Both(PAIRS["paper"], np.random.default_rng(0))
+    general, handed = both.general, [np.zeros(6), np.zeros((6, 4)), np.zeros(8)]
+    ints = np.concatenate([np.zeros(1, dtype=np.int64), general.gi])
+    handed += [general.gi, general.gr, general.work, general.jac, general.diag, ints, both.own, *both.start]
+    before = [sys.getrefcount(one) for one in handed]
+    for _ in range(3):
+        parallel_contact(ints, general.gr, both.own, np.zeros(4), 1, np.zeros(32), *handed[:3])
+        general(both.start, 1)
+    assert [sys.getrefcount(one) for one in handed] == before

@@ -33,7 +33,7 @@ two of the first changes by 1e-10, far above rounding of a weight it is added to
 far from zero the second serves."""
 _VEC = float64[::1]
 _IVEC = int64[::1]
-_BOOLS = types.boolean[:, ::1]
+_BOOLS = types.boolean[::1]
 
 
 @njit(
@@ -57,8 +57,8 @@ def _probe(functions, t, y, yp, sizes, indptr, indices, columns, groups, by_y, b
         CSC pattern of the matrix.
     columns, groups : ndarray of int64
         Unknowns that are moved together, one group after the other, and where these begin and end.
-    by_y, by_rate : ndarray of bool, shape (n, n)
-        Marked where row i changes with unknown, or rate, j; marks that are there stay.
+    by_y, by_rate : ndarray of bool
+        Entry by entry: marked where the row changes with the unknown, or rate; marks that are there stay.
     idata, rdata, work : ndarray
         Tables and scratch of the problem.
 
@@ -80,24 +80,26 @@ def _probe(functions, t, y, yp, sizes, indptr, indices, columns, groups, by_y, b
         functions.residual(t, y_moved, yp, moved, idata, rdata, work)
         for j in together:
             y_moved[j] = y[j]
-            for i in indices[indptr[j] : indptr[j + 1]]:
-                by_y[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
+            for p in range(indptr[j], indptr[j + 1]):
+                i = indices[p]
+                by_y[p] |= moved[i] != base[i] and np.isfinite(moved[i])
             yp_moved[j] = yp[j] + PROBE_OF_RATE * max(1.0, abs(yp[j]))
         functions.residual(t, y, yp_moved, moved, idata, rdata, work)
         for j in together:
             yp_moved[j] = yp[j]
-            for i in indices[indptr[j] : indptr[j + 1]]:
-                by_rate[i, j] |= moved[i] != base[i] and np.isfinite(moved[i])
+            for p in range(indptr[j], indptr[j + 1]):
+                i = indices[p]
+                by_rate[p] |= moved[i] != base[i] and np.isfinite(moved[i])
     return True
 
 
 def dependences(problem: DAEProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Return which rows depend on which unknowns, and on which rates, two tables of shape (n, n).
+    """Return for each entry of the pattern whether its row depends on its unknown, and on the rate of that.
 
     They are tried at the start, and where all that is zero there is not: products of zeros hide a dependence.
     """
-    n = problem.n
-    by_y, by_rate = np.zeros((n, n), dtype=bool), np.zeros((n, n), dtype=bool)
+    n, entries = problem.n, len(problem.indices)
+    by_y, by_rate = np.zeros(entries, dtype=bool), np.zeros(entries, dtype=bool)
     idata, rdata, work = problem.idata.copy(), problem.rdata.copy(), np.zeros(problem.work_size)
     sizes = np.minimum(np.abs(problem.scale), problem.atol_scale / PROBE)
     generic = 1.0 + np.arange(n) / (2.0 * n)
@@ -178,8 +180,8 @@ class Graph:
     Parameters
     ----------
     *lists : ndarray
-        Dependences on unknowns and on rates; wanted, solved for and differential unknowns, and those that are taken as
-        they are, without being exact; pattern of the matrix.
+        Dependences on unknowns and on rates, entry by entry; wanted, solved for and differential unknowns, and those
+        that are taken as they are, without being exact; pattern of the matrix.
     """
 
     def __init__(self, *lists: np.ndarray) -> None:
@@ -211,8 +213,12 @@ def structure(graph: Graph) -> Structure:
 
     Equations with unknowns that are taken as they are, such as multipliers, serve only for what the others leave open.
     """
-    by_y, by_rate, wanted, solved, differential, taken, indptr, indices = graph.lists
+    marked_y, marked_rate, wanted, solved, differential, taken, indptr, indices = graph.lists
     n = len(wanted)
+    columns = np.repeat(np.arange(n), np.diff(indptr))
+    by_y, by_rate = np.zeros((n, n), dtype=bool), np.zeros((n, n), dtype=bool)
+    by_y[indices[marked_y], columns[marked_y]] = True
+    by_rate[indices[marked_rate], columns[marked_rate]] = True
     unknown = np.concatenate((solved & by_y.any(axis=0), by_rate.any(axis=0) & differential))
     edges = np.concatenate((by_y, by_rate), axis=1) & unknown
     constraints = ~edges.any(axis=1) & ~by_y[:, ~differential].any(axis=1)
