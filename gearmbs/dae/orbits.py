@@ -224,7 +224,9 @@ class Orbit:
     @cached_property
     def monodromy(self) -> np.ndarray:
         """How the independent unknowns at the end change with those at the start, shape (m, m)."""
-        return self.near if self.own else monodromy_of(self.problem, self.result, self.directions)
+        if self.own:
+            return self.near
+        return monodromy_of(self.problem, self.result, self.directions, local_error=KNOWN)
 
     def looked_through(self) -> Orbit:
         """Return it with its own matrix; raise NoOrbit if its equations jump, so that this is not known."""
@@ -251,10 +253,22 @@ class Orbit:
         return float(np.abs(_by_size(self.near)[:1]).max(initial=0.0))
 
 
-def monodromy_of(problem: DAEProblem, result: DAEResult, directions: Directions, jumps: bool = True) -> np.ndarray:
+KNOWN = 1e-5
+"""Local error of a step that is allowed in a matrix whose multipliers are told: steps are those of the motion, and what
+hardly moves takes few, with which disturbances that swing fast would die out by the formula."""
+
+
+def monodromy_of(
+    problem: DAEProblem,
+    result: DAEResult,
+    directions: Directions,
+    jumps: bool = True,
+    local_error: float | None = None,
+) -> np.ndarray:
     """Return how independent unknowns at the end of a run change with those at its start, shape (m, m).
 
-    Where the equations jump it is not known, and refused; without ``jumps`` what they add is missing.
+    Where the equations jump it is not known, and refused; without ``jumps`` what they add is missing. For
+    ``local_error`` see `gearmbs.dae.tangents.follow`.
     """
     none = np.zeros(0, dtype=np.int64), np.zeros(0)
     columns = zip(directions.places, directions.basis.T, strict=True)
@@ -262,7 +276,7 @@ def monodromy_of(problem: DAEProblem, result: DAEResult, directions: Directions,
     end = replace(result, t=result.t[-1:], y=result.y[-1:], yp=result.yp[-1:])
     longest = float(result.t[-1] - result.t[0]) / LEAST_STEPS
     try:
-        followed = follow(problem, end, starts, longest, jumps)
+        followed = follow(problem, end, starts, longest, jumps, local_error)
     except ModelError as error:
         raise NoOrbit(f"how disturbances go on is not known: {error}") from None
     return np.ascontiguousarray(followed.s[:, -1, directions.places].T)

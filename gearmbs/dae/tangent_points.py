@@ -54,7 +54,10 @@ def points_of(sol: DenseOutput, longest: float = np.inf) -> tuple[np.ndarray, np
                 size, before, at = float(sizes[until - 1]), int(step_orders[until - 1]), until
                 continue
         end, h, order = float(ends[at]), float(sizes[at]), int(step_orders[at])
-        if even[at]:
+        # the last steps are cut by the end
+        still = even[at] or (at > 0 and even[at - 1] and order == 1)
+        even[at] = still
+        if still:
             order = max(order, min(EVEN_ORDER, before + 1))
         afresh = order == 1 and (before != 1 or h < SHORTER * size)
         growing |= afresh

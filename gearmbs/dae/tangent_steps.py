@@ -404,7 +404,8 @@ def _step(functions, alone, tr, plan, factors, t, k, y, yp, may_be_refused, idat
     growth = factor(plan, factors, tr.vals)
     if not growth <= tr.growth_limit:
         return False
-    functions.residual(t, y, yp, tr.minus, idata, rdata, work)
+    if tr.jumps or tr.first[tr.parameters] > 0 or not tr.constant_slopes:
+        functions.residual(t, y, yp, tr.minus, idata, rdata, work)
     if tr.points < BEGINNING or tr.points % LOOKED_AT == 0:
         _note_terms(tr, y)
     past = min(k + 1, tr.n_past)

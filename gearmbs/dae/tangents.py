@@ -51,6 +51,9 @@ DIVIDED_ORDER = 3
 """Order of the formula within steps that a first division has not made short enough: there second derivatives jump."""
 SHORTEST = 1e-3
 """Part of a step of the run below which none is divided further: equations that jump there are as wrong in any step."""
+AGAIN, SMALLER = 4, 0.5
+"""How often a run is followed at most for a local error as part of the largest value, and the part of that of the time
+before from which on this has been found."""
 CHUNK = 2048
 """Points at a time: their unknowns are laid out for the compiled loop."""
 EIGHT = 8
@@ -156,10 +159,17 @@ def follow(
             raise ModelError(JUMPS.format(direction.name, first.tr.lost_at[p]))
     if local_error is None or not (followed.error > local_error).any():
         return followed
-    again = _Following(problem, result, directions, False)
-    again.tr.allowed[:] = np.where(followed.error > 0.0, local_error * first.most, np.inf)
-    again.tr.limited = True
-    return again.through(*points)
+    found, most = followed, first.most
+    for _ in range(AGAIN):
+        again = _Following(problem, result, directions, False)
+        again.tr.allowed[:] = np.where(followed.error > 0.0, local_error * most, np.inf)
+        again.tr.limited = True
+        found = again.through(*points)
+        # steps that are too long may have made them larger than they are
+        if (again.most > SMALLER * most).all():
+            break
+        most = again.most
+    return found
 
 
 class _Following:

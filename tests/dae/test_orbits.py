@@ -187,3 +187,13 @@ def test_a_state_of_the_orbit_goes_on_along_it():
 def test_a_period_is_positive(period, said):
     with pytest.raises(ModelError, match=says("period", "s", said)):
         steady_motion(oscillator("-DX(I,J)"), period)
+
+
+@pytest.mark.parametrize("force", ["1", "COS(3*TIME)"])
+@pytest.mark.parametrize(("stiffness", "damping"), [(20.0, 0.2), (20.0, -0.02), (200.0, 0.2), (200.0, -0.02)])
+def test_multipliers_of_motions_that_hardly_move(force, stiffness, damping):
+    """Disturbances swing faster than anything that steps are chosen for; exp(-c T / 2 m) is left of them."""
+    m = oscillator(f"{force}-({damping})*VX(I,J)-{stiffness}*DX(I,J)")
+    motion = steady_motion(m, TAU / 3.0, attracting=False, settle=0)
+    np.testing.assert_allclose(np.abs(motion.multipliers), np.exp(-damping * TAU / 6.0), rtol=4e-3)
+    assert motion.stable == (damping > 0.0)

@@ -77,9 +77,9 @@ def test_forces_without_jumps_are_not_looked_through_before_multipliers_are_aske
 
     looked, follow = [], orbits.follow
 
-    def counted(problem, end, starts, longest, jumps):
+    def counted(problem, end, starts, longest, jumps, local_error):
         looked.append(jumps)
-        return follow(problem, end, starts, longest, jumps)
+        return follow(problem, end, starts, longest, jumps, local_error)
 
     monkeypatch.setattr(orbits, "follow", counted)
     motion = gm.steady(Case(operation={"speed": "3000 rpm", "torque": 20.0}), variables=["gmf_rms"])
