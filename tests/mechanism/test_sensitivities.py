@@ -401,3 +401,20 @@ def test_limits_that_are_infinite_say_nothing_of_a_parameter(recwarn):
     assert not recwarn.list
     way = run.derivative("mu", lambda s: s.com_position("body")[:, 0])
     assert way == pytest.approx(-9.81 * run.solution.t**2 / 2, rel=1e-3, abs=1e-6)
+
+
+def test_a_stop_that_moves_with_what_touches_it():
+    """Everything is shifted, and all places with it; the stop alone moves a thousand times as far as it is deep."""
+
+    def stopped(x):
+        made = gm.Mechanism("stopped")
+        body = made.body("body", mass=1.0, inertia=(1, 1, 1), position=(0.9 + x, 0, 0))
+        made.translational("slide", body, made.ground, at=(0, 0, 0), axis=(1, 0, 0))
+        made.parameter("g", "m", 0.9 + x)
+        force = "IMPACT(DX(I,J),VX(I,J),g,1e8,1.5,100,1e-4)-STEP(TIME,0,0,0.01,10)"
+        made.load("force", body.marker(name="I"), made.ground.marker(name="J"), fx=force)
+        return made
+
+    run = forward_sensitivities(stopped, {"x": (0.0, 1.0)}, 0.02, rate=1000, tol=1e-10)
+    places = run.derivative("x", lambda s: s.com_position("body")[:, 0])
+    assert places == pytest.approx(np.ones(21), abs=1e-7)
