@@ -14,13 +14,17 @@ from gearmbs.files import whole_file
 from gearmbs.native.asked import Told
 from gearmbs.units import powers_of
 
-PLATFORMS = {"2.0": "linux64", "3.0": "x86_64-linux"}
-"""Folders of binaries by the version of FMI."""
 BASE = ("m", "kg", "s", "rad")
 """Base units as FMI names them, in the order of `gearmbs.units.powers_of`."""
 ABILITIES = {
     "2.0": dict.fromkeys(("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative"), "true"),
-    "3.0": dict.fromkeys(("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"), "true"),
+    "3.0": dict.fromkeys(
+        (
+            *("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives"),
+            *("hasEventMode", "providesIntermediateUpdate", "canReturnEarlyAfterIntermediateUpdate"),
+        ),
+        "true",
+    ),
 }
 VECTORS = {("x", "y", "z"): "", ("fx", "fy", "fz"): "force", ("tx", "ty", "tz"): "moment"}
 """Components that are one array, and what they are called after what they are of."""
@@ -189,9 +193,10 @@ def model_description(told: Description, version: str) -> bytes:
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="utf-8")
 
 
-def write_fmu(path: Path, told: Description, version: str, library: Path) -> Path:
-    """Write an FMU that appears under its name when it is whole."""
+def write_fmu(path: Path, told: Description, version: str, libraries: Mapping[str, Path]) -> Path:
+    """Write an FMU that appears under its name when it is whole, with libraries by their places among binaries."""
     with whole_file(path) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("modelDescription.xml", model_description(told, version))
-        archive.write(library, f"binaries/{PLATFORMS[version]}/{told.identifier}.so")
+        for place, library in libraries.items():
+            archive.write(library, f"binaries/{place}")
     return path

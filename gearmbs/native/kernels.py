@@ -89,11 +89,12 @@ class Kernels:
         }
         own = [(kernel, None) for kernel in model.kernels.values()] + list(model.own_functions.values())
         self._own = {
-            address(kernel, kernel.declared if signature is None else signature): kernel
+            address(kernel, kernel.declared if signature is None else signature): (kernel, signature)
             for kernel, signature in own
-            if isinstance(kernel, Kernel)
+            if hasattr(kernel, "py_func")
         }
-        self.found: list[Kernel] = []
+        self._signatures: dict[Any, Any] = {}
+        self.found: list[Any] = []
         states = len(model.states) + len(model.tapes) + sum(model.modes)
         self.needs_late = states > 0 or bool((model.forces[:, T.FORCE_KIND] == T.REACTION).any())
 
@@ -106,32 +107,38 @@ class Kernels:
             For a function that is none of compiled code that can be exported.
         """
         if isinstance(asked, str):
-            kernel = self._by_name[asked]
+            kernel, signature = self._by_name[asked], None
         else:
-            kernel = self._own.get(asked) or _named(NAMES[asked])
-        if not isinstance(kernel, Kernel):
+            kernel, signature = self._own.get(asked) or (_named(NAMES[asked]), None)
+        if not hasattr(kernel, "py_func"):
             told = asked if isinstance(asked, str) else NAMES[asked]
             raise ModelError(
-                f"function {told!r}: it cannot be exported; declare it with "
-                "gearmbs.kernels.jit.njit, a signature and cache=True"
+                f"function {told!r}: it is one of Python and cannot be exported; compile it with numba.njit"
             )
         if kernel not in self.found:
             self.found.append(kernel)
+            self._signatures[kernel] = signature
         return self.found.index(kernel)
 
-    def objects(self, processor: str, report: Callable[[str], None]) -> Objects:
-        """Return the objects of all kernels; ``report`` is told the name of each."""
+    def objects(self, processor: str, triple: str, report: Callable[[str], None]) -> Objects:
+        """Return the objects of all kernels for a processor and a system; ``report`` is told the name of each."""
         # what the plain mode does without
-        from gearmbs.kernels.objects import compiled_object
+        from gearmbs.kernels.objects import compiled_object, object_of_function
 
         called = {}
         for name, (kernel, signature) in CALLED.items():
             report(name)
-            called[name] = compiled_object(kernel, processor, signature)
+            called[name] = compiled_object(kernel, processor, signature, triple)
         numbered = []
-        for kernel in self.found:
+        for number, kernel in enumerate(self.found):
             report(kernel.__name__)
-            numbered.append(compiled_object(kernel, processor))
+            if isinstance(kernel, Kernel):
+                numbered.append(compiled_object(kernel, processor, triple=triple))
+                continue
+            try:
+                numbered.append(object_of_function(kernel, processor, self._signatures[kernel], str(number), triple))
+            except ValueError as error:
+                raise ModelError(str(error)) from None
         late: dict[str, Object] = {}
         waiting = [name for one in (*called.values(), *numbered) for name in one.late] if self.needs_late else []
         while waiting:
@@ -139,7 +146,8 @@ class Kernels:
             if name not in late:
                 module, _, kernel_name = name.partition(":")
                 report(kernel_name)
-                late[name] = compiled_object(getattr(importlib.import_module(module), kernel_name), processor)
+                found = getattr(importlib.import_module(module), kernel_name)
+                late[name] = compiled_object(found, processor, triple=triple)
                 waiting += late[name].late
         return Objects(called, numbered, late)
 

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import platform
 import re
-import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 import gearmbs
-from gearmbs.dae.problem import ModelError
+from gearmbs.dae.problem import INPUT, ModelError
 from gearmbs.files import write_whole
 from gearmbs.kernels import PLAIN
 from gearmbs.mechanism.mechanism import Mechanism
@@ -29,23 +26,28 @@ from gearmbs.native.fmu import Description, variables_of, widths_of, write_fmu
 from gearmbs.native.kernels import Kernels
 from gearmbs.native.memory import Memory, memory_of
 from gearmbs.native.outputs import chosen_outputs
+from gearmbs.native.systems import SYSTEMS, System, c_compiler, system_of
 from gearmbs.wording import any_of
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.solve.keywords import SimulatorOptions
     from gearmbs.units import QuantityLike
 
-PORTABLE = {"x86_64": "x86-64-v3", "AMD64": "x86-64-v3"}
-"""Processors that libraries are made for, by the kind of machine: those of the last ten years, with fused products."""
-COMPILERS = (("cc",), ("gcc",), ("clang",))
 TARGETS = {"so": None, "fmu2": "2.0", "fmu3": "3.0"}
 """What can be written: a library, or an FMU of a version of FMI."""
 SOURCES = {"so": (), "fmu2": ("fmu.c", "fmi2.c"), "fmu3": ("fmu.c", "fmi3.c")}
 """Sources beside those of every library."""
 HEADERS = ("gearmbs.h", "model.h", "fmu.h")
+_BLOCK = {
+    ".so": '__asm__(".section .rodata\\n.balign 64\\n.global gearmbs_block\\n.hidden gearmbs_block\\n"\n'
+    '        "gearmbs_block:\\n.incbin \\"block.bin\\"\\n.previous\\n");',
+    ".dll": '__asm__(".section .rdata,\\"dr\\"\\n.balign 64\\n.global gearmbs_block\\n"\n'
+    '        "gearmbs_block:\\n.incbin \\"block.bin\\"\\n.text\\n");',
+}
+"""How the memory of a run gets into a library, by the ending of its name."""
 FEWEST_ZEROS = 256
 """Zeros in a row that are not written to the library: a piece of memory takes 16 bytes in its list."""
-FLAGS = ("-O2", "-std=c11", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra")
+FLAGS = ("-O2", "-std=c11", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra")
 
 
 @dataclass(frozen=True)
@@ -56,19 +58,25 @@ class Exported:
     ----------
     folder, library : Path
         Where it is, and the library or FMU.
+    libraries : dict of str to Path
+        Libraries by the system they are for, or the FMU, which holds those of all.
     numbers, outputs : dict of str to str
         What can be set and what is told, with their units, in the order of the library.
     left_out : list of str
         Outputs of the mechanism that the library does not tell.
+    held : list of str
+        Inputs of the mechanism that cannot be set, and keep their values: they prescribe motions.
     processor : str
-        What it runs on.
+        What it runs on, of the first system.
     """
 
     folder: Path
     library: Path
+    libraries: dict[str, Path]
     numbers: dict[str, str]
     outputs: dict[str, str]
     left_out: list[str]
+    held: list[str]
     processor: str
 
 
@@ -81,6 +89,7 @@ def export(
     name: str | None = None,
     outputs: Sequence[Any] | None = None,
     processor: str | None = None,
+    systems: Sequence[str] = ("linux",),
     compiler: str | None = None,
     arrays: bool = False,
     report: Callable[[str], None] | None = None,
@@ -107,8 +116,12 @@ def export(
     processor : str, optional
         A name of LLVM's, or "native" for that of this machine. Default: any x86-64 with AVX2 and FMA, and of other
         machines this one.
+    systems : sequence of {"linux", "windows", "linux-arm64"}
+        What libraries are made for: this system, Windows on x86-64, Linux on 64-bit ARM processors. An FMU holds those
+        of all.
     compiler : str, optional
-        Command of the C compiler. Default: cc, gcc or clang, whichever there is, or that of the package ziglang.
+        Command of the C compiler. Default: cc, gcc or clang, whichever there is, or that of the package ziglang; for
+        other systems a GNU compiler for them, or ziglang.
     arrays : bool
         Whether an FMU of FMI 3.0 has components of vectors as arrays, and not one by one.
     report : callable, optional
@@ -138,7 +151,12 @@ def export(
         model = Simulator(model, t_end, records=False, **settings)
     elif t_end is not None or options:
         raise ModelError("a simulator has its end and options already; give t_end and options with a mechanism")
-    command = c_compiler(compiler)
+    asked = {name: system_of(name) for name in systems}
+    if not asked or (target == "fmu2" and not all(one.folders[0] for one in asked.values())):
+        raise ModelError(
+            f"systems = {list(systems)!r}: target {target!r} is for others; choose of {any_of(list(SYSTEMS))}"
+        )
+    commands = {name: c_compiler(compiler, one) for name, one in asked.items()}
     begun = model.begun()
     title = name or begun.system.mechanism.name
     numbers = {
@@ -157,54 +175,54 @@ def export(
         memory = memory_of(begun, numbers, told, kernels.number)
     known = {key: (n.kind, n.unit, n.value(begun.run.state.rdata, begun.point.t)) for key, n in numbers.items()}
     variables = variables_of(known, told, arrays)
-    processor = processor or PORTABLE.get(platform.machine(), "native")
+    processors = {name: processor or one.processor for name, one in asked.items()}
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     stem = re.sub(r"\W+", "_", title).strip("_") or "model"
-    with tempfile.TemporaryDirectory(prefix="gearmbs-") as room:
+    with tempfile.TemporaryDirectory(prefix="gearmbs-") as rooms:
         texts, token = _texts(begun, title, memory, numbers, told, model.t_end, widths_of(variables))
-        made = _compile(Path(room), command, SOURCES[target], kernels, processor, memory, texts, report or _silent)
+        made: dict[str, Path] = {}
+        for name, system in asked.items():
+            room = Path(rooms, name)
+            room.mkdir()
+            made[name] = _compile(
+                room / f"{stem}{system.ending}", commands[name], SOURCES[target], kernels, processors[name], system,
+                memory, texts, report or _silent,
+            )  # fmt: skip
         version = TARGETS[target]
         if version is None:
-            library = write_whole(folder / f"{stem}.so", made.read_bytes())
-            library.chmod(0o755)
+            libraries = {
+                name: write_whole(folder / f"{stem}{_ending(name, asked)}", one.read_bytes())
+                for name, one in made.items()
+            }
+            for path in libraries.values():
+                path.chmod(0o755)
             for file in ("gearmbs.h", "example.c", "example.cpp"):
                 (folder / file).write_bytes(_source(file))
         else:
             described = Description(
                 title, stem, token, f"gearmbs {gearmbs.__version__}", float(begun.point.t), model.t_end, variables
             )
-            library = write_fmu(folder / f"{stem}.fmu", described, version, made)
+            places = {
+                f"{asked[name].folders[version == '3.0']}/{stem}{asked[name].ending}": made[name] for name in made
+            }
+            libraries = dict.fromkeys(made, write_fmu(folder / f"{stem}.fmu", described, version, places))
     units = {key: number.unit for key, number in numbers.items()}
-    return Exported(folder, library, units, {one.name: one.unit for one in told}, left, processor)
+    held = [key for key, number in begun.problem.numbers.items() if number.kind == INPUT and key not in numbers]
+    outputs_told = {one.name: one.unit for one in told}
+    first = next(iter(libraries))
+    return Exported(folder, libraries[first], libraries, units, outputs_told, left, held, processors[first])
+
+
+def _ending(name: str, asked: dict[str, System]) -> str:
+    """Return the end of the name of a library: of one of two with the same ending it tells the system."""
+    ending = asked[name].ending
+    alone = [one.ending for one in asked.values()].count(ending) == 1
+    return ending if alone or name == "linux" else f".{name}{ending}"
 
 
 def _silent(name: str) -> None:
     """Tell nothing of a kernel."""
-
-
-def c_compiler(given: str | None) -> list[str]:
-    """Return the command of a C compiler.
-
-    Raises
-    ------
-    ModelError
-        If there is none.
-    """
-    for command in COMPILERS if given is None else ((given,),):
-        if shutil.which(command[0]) is not None:
-            return list(command)
-    if given is None:
-        try:
-            import ziglang  # noqa: F401
-
-            return [sys.executable, "-m", "ziglang", "cc"]
-        except ImportError:
-            pass
-    tried = given or ", ".join(command[0] for command in COMPILERS)
-    raise ModelError(
-        f"compiler: {tried} was not found; install gcc or clang, or the package ziglang (pip install ziglang)"
-    )
 
 
 def _source(name: str) -> bytes:
@@ -277,11 +295,15 @@ def _texts(
 
 
 def _compile(
-    room: Path, command: list[str], others: Sequence[str], kernels: Kernels, processor: str, memory: Memory, texts: str,
-    report: Callable[[str], None],
+    library: Path, command: list[str], others: Sequence[str], kernels: Kernels, processor: str, system: System,
+    memory: Memory, texts: str, report: Callable[[str], None],
 ) -> Path:  # fmt: skip
-    """Compile kernels and sources in a folder, and link them; return the library."""
-    called, numbered, late = kernels.objects(processor, report)
+    """Compile kernels and sources in the folder of a library, and link them; return its path.
+
+    A program for Windows asks for a library by the name that it had here.
+    """
+    room = library.parent
+    called, numbered, late = kernels.objects(processor, system.triple, report)
     objects = {one.symbol: one.code for one in (*called.values(), *numbered, *late.values())}
     for symbol, code in objects.items():
         (room / f"{symbol}.o").write_bytes(code)
@@ -295,8 +317,7 @@ def _compile(
         _array("void *const", "kernels", [f"(void *){one.symbol}" for one in numbered]),
         _array("void *const", "late", [f"(void *){one.symbol}" for one in late.values()]),
         _array("const char *const", "late_names", [_text(name) for name in late]),
-        '__asm__(".section .rodata\\n.balign 64\\n.global gearmbs_block\\n.hidden gearmbs_block\\n"',
-        '        "gearmbs_block:\\n.incbin \\"block.bin\\"\\n.previous\\n");',
+        _BLOCK[system.ending],
     ]
     (room / "described.c").write_text("\n".join([*head, texts]), encoding="utf-8")
     sources = ["gearmbs.c", "runtime.c", *others]
@@ -308,17 +329,17 @@ def _compile(
         *command,
         "-shared",
         *FLAGS,
+        *system.flags,
         *names,
         *sources,
         "described.c",
         *made,
         "-lm",
-        "-Wl,-z,defs",
         "-s",
         "-o",
-        "made.so",
+        library.name,
     ]
     done = subprocess.run(run, cwd=room, capture_output=True, text=True)
     if done.returncode:
         raise ModelError(f"compiler: {' '.join(command)} could not link the library: {done.stderr.strip()[:2000]}")
-    return room / "made.so"
+    return library

@@ -134,6 +134,7 @@ def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], fun
         "time": structs["driver"] + member_of(Driver, "t"),
         "present": structs["driver"] + member_of(Driver, "present"),
         "steps": structs["run"] + member_of(RunState, "steps"),
+        "integrated": structs["run"] + member_of(RunState, "t"),
     }
     arrays = {
         "waiting": driver.waiting,

@@ -120,6 +120,9 @@ def export(
     processor: Annotated[
         str | None, typer.Option(help="A name of LLVM's, or native; default: any x86-64 with AVX2 and FMA.")
     ] = None,
+    systems: Annotated[
+        str, typer.Option(help="linux, windows, linux-arm64, with commas between; an FMU is for all of them.")
+    ] = "linux",
     arrays: Annotated[bool, typer.Option("--arrays", help="Of fmu3: vectors as arrays, not one by one.")] = False,
     torques: Annotated[
         str | None, typer.Option(help='Of tables, on the driven wheel, e.g. "20 N m, 50 N m"; default: about the load.')
@@ -141,11 +144,14 @@ def export(
         mechanism, end, options = described_model(file)
         folder = out or file.with_suffix("")
         made = exported(
-            mechanism, folder, target=target, t_end=t_end or end, name=name, processor=processor, arrays=arrays,
-            **options,
+            mechanism, folder, target=target, t_end=t_end or end, name=name, processor=processor,
+            systems=[part.strip() for part in systems.split(",") if part.strip()], arrays=arrays, **options,
         )  # fmt: skip
         for what, named in (("set", made.numbers), ("told", made.outputs)):
             typer.echo(f"can be {what}: {len(named)}")
+        if made.held:
+            typer.echo(f"note: inputs that prescribe motions keep their values: {', '.join(made.held)}", err=True)
         if made.left_out:
             typer.echo(f"note: left out, which a library does not tell: {', '.join(made.left_out)}", err=True)
-        typer.echo(f"wrote {made.library}")
+        for library in dict.fromkeys(made.libraries.values()):
+            typer.echo(f"wrote {library}")

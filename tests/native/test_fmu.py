@@ -41,7 +41,7 @@ def made(request, tmp_path_factory):
 class Driven:
     """An FMU that is driven call by call, in both versions by the same names."""
 
-    def __init__(self, path, folder):
+    def __init__(self, path, folder, **options):
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
@@ -54,7 +54,7 @@ class Driven:
             guid=told.guid, unzipDirectory=where, instanceName="pair",
             modelIdentifier=told.coSimulation.modelIdentifier,
         )  # fmt: skip
-        self.fmu.instantiate()
+        self.fmu.instantiate(**options)
         self.t = 0.0
 
     def begin(self, **numbers):
@@ -325,6 +325,71 @@ def test_a_span_that_was_not_exported_is_refused(made, tmp_path):
         driven.step(0.5 * END)
     for one in (refused, driven):
         one.fmu.freeInstance()
+
+
+def pendulum():
+    m = gm.Mechanism("pendulum", gravity=(0.0, -9.81, 0.0))
+    arm = m.body("arm", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.5, 0.0, 0.0))
+    m.revolute("pin", arm, m.ground, axis=(0, 0, 1))
+    m.torque("drive", arm, m.input("torque", "N m"))
+    m.output("speed", ("angular_velocity", "arm", "z"))
+    m.output("height", ("com_position", "arm", "y"))
+    return m
+
+
+@pytest.fixture(scope="module")
+def swinging(tmp_path_factory):
+    return export(pendulum(), tmp_path_factory.mktemp("swinging"), t_end=1.0, target="fmu3", processor="native")
+
+
+@pytest.mark.parametrize("early", [False, True])
+def test_steps_on_the_way_are_told_and_may_be_the_last(swinging, early, tmp_path):
+    """Where steps of the integrator end, values are those of a simulator; a run that ended early goes on alike."""
+    asked_at, ends_at, seen, flags = 0.2, 0.3, [], []
+
+    def update(environment, t, may_set, may_get, step_ends, may_return, returns, at):
+        flags.append((may_set, may_get, step_ends, may_return))
+        seen.append((t, *driven.get("speed", "height")))
+        if t > asked_at:
+            returns[0], at[0] = True, ends_at
+
+    driven = Driven(str(swinging.library), tmp_path, intermediateUpdate=update, earlyReturnAllowed=early).begin()
+    told = driven.fmu.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.5)
+    end = ends_at if early else 0.5
+    assert told == (False, False, early, end)
+    times = np.array([t for t, *_ in seen])
+    # all but the last are ends of steps
+    assert len(times) > 8
+    assert (np.diff(times) > 0.0).all()
+    assert times[-1] == end
+    assert flags == [(False, True, True, early)] * (len(times) - 1) + [(False, True, False, False)]
+    sim = gm.Simulator(pendulum(), 1.0, lump=False, records=False)
+    for t, *values in seen:
+        sim.advance(t)
+        assert values == [sim.get("angular_velocity", "arm")[2], sim.get("com_position", "arm")[1]]
+    driven.fmu.doStep(currentCommunicationPoint=end, communicationStepSize=1.0 - end)
+    sim.advance(1.0)
+    assert driven.get("speed")[0] == sim.get("angular_velocity", "arm")[2]
+    driven.end()
+
+
+def test_inputs_jump_in_event_mode(swinging):
+    """A torque that jumps by an event acts from it on, as one that is set between two steps."""
+    steps = np.array([(0.0, 0.0), (0.25, 0.0), (0.25, 6.0), (1.0, 6.0)], dtype=[("time", float), ("torque", float)])
+    results = [
+        fmpy.simulate_fmu(str(swinging.library), stop_time=1.0, output_interval=0.05, input=steps, use_event_mode=mode)
+        for mode in (False, True)
+    ]
+    for result in results:
+        # w' = (m g l cos - torque) / J alters where it jumps
+        assert result["speed"][-1] == pytest.approx(results[0]["speed"][-1], rel=1e-9)
+    sim = gm.Simulator(pendulum(), 1.0, lump=False, records=False)
+    for t in (*np.arange(1, 6) * 0.05, None, *np.arange(6, 21) * 0.05):
+        if t is None:
+            sim.set("torque", 6.0)
+        else:
+            sim.advance(min(t, 1.0))
+    assert results[1]["speed"][-1] == pytest.approx(sim.get("angular_velocity", "arm")[2], rel=1e-9)
 
 
 def test_names_and_targets():

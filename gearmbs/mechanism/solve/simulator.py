@@ -435,7 +435,8 @@ class Simulator(Sampled, Restored, Guessed):
             If that fails, or something of it is in Python: functions, controllers, stops; or an input is on its way.
         """
         held = [
-            *(["functions of Python"] if self._functions or self._options.errors is not None else []),
+            *(f"the function {one.name!r} of Python" for one in self._functions),
+            *(["functions of Python"] if self._options.errors is not None and not self._functions else []),
             *(["controllers"] if self._controls else []),
             *(["stops"] if self._stops else []),
             *(["inputs on their way"] if self._settings.on_the_way(self.t) is not None else []),

@@ -13,6 +13,8 @@ typedef unsigned fmi3ValueReference;
 typedef void *fmi3Instance;
 typedef const char *fmi3String;
 typedef void (*fmi3Logger)(void *environment, fmi3Status status, fmi3String category, fmi3String message);
+typedef void (*fmi3Update)(void *environment, double time, bool may_set, bool may_get, bool step_ends, bool may_return,
+                           bool *returns, double *at);
 
 static void tell(const fmu *self, int status, const char *message) {
     fmi3Logger logger;
@@ -28,12 +30,17 @@ GEARMBS_API fmi3Status fmi3SetDebugLogging(fmi3Instance c, bool on, size_t n, co
 
 GEARMBS_API fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String name, fmi3String token, fmi3String resources, bool visible, bool logging, bool events, bool early,
-    const fmi3ValueReference intermediate[], size_t n, void *environment, fmi3Logger logger, void *update) {
+    const fmi3ValueReference intermediate[], size_t n, void *environment, fmi3Logger logger, fmi3Update update) {
     void *kept = NULL;
-    (void)resources, (void)visible, (void)logging, (void)early, (void)intermediate, (void)n, (void)update;
+    (void)resources, (void)visible, (void)logging, (void)events, (void)intermediate, (void)n;
     if (logger != NULL) memcpy(&kept, &logger, sizeof logger);
-    if (events || name == NULL || token == NULL) return NULL;
-    return fmu_new(name, token, environment, kept, tell);
+    if (name == NULL || token == NULL) return NULL;
+    fmu *made = fmu_new(name, token, environment, kept, tell);
+    if (made != NULL && update != NULL) {
+        memcpy(&made->update, &update, sizeof update);
+        made->returns_early = early;
+    }
+    return made;
 }
 
 GEARMBS_API fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, bool visible,
@@ -59,6 +66,7 @@ GEARMBS_API fmi3Status fmi3EnterInitializationMode(fmi3Instance c, bool has_tole
 
 GEARMBS_API fmi3Status fmi3ExitInitializationMode(fmi3Instance c) { return (void)c, FMU_OK; }
 GEARMBS_API fmi3Status fmi3EnterStepMode(fmi3Instance c) { return (void)c, FMU_OK; }
+GEARMBS_API fmi3Status fmi3EnterEventMode(fmi3Instance c) { return (void)c, FMU_OK; }
 GEARMBS_API fmi3Status fmi3Terminate(fmi3Instance c) { return (void)c, FMU_OK; }
 GEARMBS_API fmi3Status fmi3Reset(fmi3Instance c) { return fmu_reset(c); }
 
@@ -170,13 +178,47 @@ GEARMBS_API fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const uint8_t byt
     return FMU_OK;
 }
 
+/* Go on by a step, and tell the importer of each step of the integrator on the way; it may ask to return before the end. */
+static fmi3Status step_with_updates(fmu *self, double time, double size, bool *early) {
+    double end, now = gearmbs_time(self->instance);
+    int status = fmu_end(self, time, size, &end);
+    fmi3Update update;
+    memcpy(&update, &self->update, sizeof update);
+    while (status == FMU_OK && now < end) {
+        double next = fmu_next(self), wanted = end;
+        bool returns = false;
+        status = fmu_go(self, next < end ? next : end);
+        if (status != FMU_OK) break;
+        now = gearmbs_time(self->instance);
+        bool step_ends = now == gearmbs_integrated(self->instance);
+        if (!step_ends && now < end) continue;
+        update(self->environment, now, false, true, step_ends, self->returns_early && now < end, &returns, &wanted);
+        if (returns && self->returns_early && wanted < end) {
+            end = wanted > now ? wanted : now;
+            *early = true;
+        }
+    }
+    return status;
+}
+
 GEARMBS_API fmi3Status fmi3DoStep(fmi3Instance c, double time, double size, bool no_rollback, bool *event, bool *ends,
                                   bool *early, double *last) {
-    int status = fmu_step(c, time, size);
+    fmu *self = c;
     (void)no_rollback;
     *event = *ends = *early = false;
-    *last = gearmbs_time(((fmu *)c)->instance);
+    int status = self->update == NULL ? fmu_step(self, time, size) : step_with_updates(self, time, size, early);
+    *last = gearmbs_time(self->instance);
     return status;
+}
+
+/* Inputs may jump in event mode, as at any communication point; the model has no discrete states and no events of its
+   own. */
+GEARMBS_API fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, bool *again, bool *ends, bool *nominals, bool *states,
+                                                bool *defined, double *next) {
+    (void)c;
+    *again = *ends = *nominals = *states = *defined = false;
+    *next = 0.0;
+    return FMU_OK;
 }
 
 GEARMBS_API fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t rows,
@@ -191,7 +233,7 @@ GEARMBS_API fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3Va
     return status;
 }
 
-/* What this model has none of: arrays that change, clocks, events, derivatives by time and backwards. */
+/* What this model has none of: arrays that change, clocks, derivatives by time and backwards. */
 #define NONE(name, ...)                                                                                                \
     GEARMBS_API fmi3Status fmi3##name(fmi3Instance c, __VA_ARGS__) { return fmu_refuse(c, #name " is not provided."); }
 #define NONE_OF_INSTANCE(name)                                                                                         \
@@ -201,7 +243,6 @@ GEARMBS_API fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3Va
 typedef const fmi3ValueReference *references;
 NONE_OF_INSTANCE(EnterConfigurationMode)
 NONE_OF_INSTANCE(ExitConfigurationMode)
-NONE_OF_INSTANCE(EnterEventMode)
 NONE_OF_INSTANCE(EnterContinuousTimeMode)
 NONE_OF_INSTANCE(EvaluateDiscreteStates)
 NONE(GetNumberOfVariableDependencies, fmi3ValueReference r, size_t *count)
@@ -218,7 +259,6 @@ NONE(SetIntervalDecimal, references r, size_t n, const double intervals[])
 NONE(SetIntervalFraction, references r, size_t n, const uint64_t counters[], const uint64_t resolutions[])
 NONE(SetShiftDecimal, references r, size_t n, const double shifts[])
 NONE(SetShiftFraction, references r, size_t n, const uint64_t counters[], const uint64_t resolutions[])
-NONE(UpdateDiscreteStates, bool *again, bool *ends, bool *nominals, bool *states, bool *defined, double *next)
 NONE(CompletedIntegratorStep, bool no_rollback, bool *event, bool *ends)
 NONE(SetTime, double time)
 NONE(SetContinuousStates, const double states[], size_t count)

@@ -3,6 +3,7 @@
 #include "fmu.h"
 #include "model.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -173,14 +174,32 @@ int fmu_span(const fmu *self, double start, int has_stop, double stop) {
     return fmu_refuse(self, text);
 }
 
-/* Go on by a step from a time, which is the present one but for rounding. */
-int fmu_step(fmu *self, double time, double size) {
-    double now = gearmbs_time(self->instance), end = time + size, last = gearmbs_end_time();
+/* Write the end of a step from a time, which is the present one but for rounding. */
+int fmu_end(const fmu *self, double time, double size, double *end) {
+    double now = gearmbs_time(self->instance), last = gearmbs_end_time();
+    *end = time + size;
     if (time < now - span_of(now) || time > now + span_of(now) || !(size >= 0.0))
         return fmu_refuse(self, "The step does not begin at the present time, or goes back.");
-    if (end > last && end <= last + span_of(last)) end = last;
+    if (*end > last && *end <= last + span_of(last)) *end = last;
+    return FMU_OK;
+}
+
+/* Go on to a time, unless it is passed. */
+int fmu_go(fmu *self, double end) {
     self->known = 0;
-    return end <= now ? FMU_OK : status_of(self, gearmbs_advance(self->instance, end));
+    return end <= gearmbs_time(self->instance) ? FMU_OK : status_of(self, gearmbs_advance(self->instance, end));
+}
+
+int fmu_step(fmu *self, double time, double size) {
+    double end;
+    int status = fmu_end(self, time, size, &end);
+    return status == FMU_OK ? fmu_go(self, end) : status;
+}
+
+/* Return the end of the step of the integrator under way, or a time within the next one. */
+double fmu_next(const fmu *self) {
+    double now = gearmbs_time(self->instance), end = gearmbs_integrated(self->instance);
+    return end > now ? end : nextafter(now, HUGE_VAL);
 }
 
 int fmu_reset(fmu *self) {

@@ -13,7 +13,8 @@ typedef struct fmu {
     gearmbs_instance *instance;
     double *outputs;
     int known;  /* whether outputs hold what they are at the present time */
-    void *environment, *logger;
+    void *environment, *logger, *update;
+    int returns_early; /* whether a step may end before its time */
     char *name;
     void (*tell)(const struct fmu *self, int status, const char *message);
 } fmu;
@@ -26,7 +27,10 @@ int fmu_set(fmu *self, const unsigned *references, size_t count, const double *v
 int fmu_derivative(fmu *self, const unsigned *unknowns, size_t rows, const unsigned *known, size_t columns,
                    const double *along, double *values);
 int fmu_span(const fmu *self, double start, int has_stop, double stop);
+int fmu_end(const fmu *self, double time, double size, double *end);
+int fmu_go(fmu *self, double end);
 int fmu_step(fmu *self, double time, double size);
+double fmu_next(const fmu *self);
 int fmu_reset(fmu *self);
 int fmu_save(fmu *self, void **state);
 int fmu_restore(fmu *self, const void *state, size_t size);

@@ -110,6 +110,12 @@ double gearmbs_time(const gearmbs_instance *instance) {
     return t;
 }
 
+double gearmbs_integrated(const gearmbs_instance *instance) {
+    double t;
+    memcpy(&t, at(instance, model->integrated), sizeof t);
+    return t;
+}
+
 long long gearmbs_steps(const gearmbs_instance *instance) { return read_word(at(instance, model->steps)); }
 
 int gearmbs_set(gearmbs_instance *instance, size_t number, double value) {

@@ -58,8 +58,9 @@ GEARMBS_API const char *gearmbs_unknown_name(size_t unknown);
 GEARMBS_API gearmbs_instance *gearmbs_create(void);
 GEARMBS_API void gearmbs_free(gearmbs_instance *instance);
 
-/* The present time, s, and the steps taken so far. */
+/* The present time, s, the end of the last step of the integrator, which may lie behind it, and the steps taken so far. */
 GEARMBS_API double gearmbs_time(const gearmbs_instance *instance);
+GEARMBS_API double gearmbs_integrated(const gearmbs_instance *instance);
 GEARMBS_API long long gearmbs_steps(const gearmbs_instance *instance);
 
 /* Let a number take another value from the present time on; it takes effect with the next advance or save. */

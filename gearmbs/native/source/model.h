@@ -22,7 +22,7 @@ typedef struct {
     int64_t bound, run, part, plan, factors, driver, room, columns, rows;
     int64_t teller, told_plan, told_factors, told_room, told_columns, told_rows;
     /* offsets of single members and arrays */
-    int64_t time, present, steps, waiting, wanted, values, rates, out;
+    int64_t time, present, steps, integrated, waiting, wanted, values, rates, out;
     int64_t counts;                            /* whether outputs count angles from point to point */
     int64_t numbers, outputs, unknowns;
     const int64_t *widths;                     /* of each number and output how many a variable of its reference has */
