@@ -31,15 +31,10 @@ hunt: $(VENV)/.installed-dev
 wheel: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest tests/test_wheel.py
 
-# what is published for Linux on x86-64: a wheel with all kernels, compiled, and those that the documentation's pages
-# compile besides; a quarter of an hour
-dist: export NUMBA_CPU_NAME := x86-64-v3
-dist: export NUMBA_CPU_FEATURES :=
-dist: export NUMBA_CACHE_DIR := $(CURDIR)/$(OUT)/kernels
-dist: $(VENV)/.installed-dev $(VENV)/.installed-docs
-	rm -rf $(OUT)/kernels $(OUT)/executed dist
-	$(BIN)/python -m gearmbs.compile --quiet
-	$(BIN)/python -m sphinx -q -b html -D nb_execution_cache_path=$(CURDIR)/$(OUT)/executed docs $(OUT)/pages
+# what is published for Linux on x86-64: a wheel with all kernels compiled, and what exports are linked of; those of the
+# last one are kept, so that a further one compiles what has changed alone
+dist: $(VENV)/.installed-dev
+	rm -rf dist
 	$(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	$(BIN)/python -m gearmbs.kernels.ship dist/gearmbs-*-none-any.whl --out dist --kernels $(OUT)/kernels
 

@@ -12,6 +12,7 @@ SCRIPTS = HERE / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 
 import api_pages  # noqa: E402
+import asked_kernels  # noqa: E402
 import offline  # noqa: E402
 import thumbnails  # noqa: E402
 
@@ -28,6 +29,8 @@ profile = HERE / "_build" / "ipython" / "profile_default"
 profile.mkdir(parents=True, exist_ok=True)
 (profile / "ipython_kernel_config.py").write_text("get_config().IPKernelApp.log_level = 40\n", encoding="utf-8")
 os.environ["IPYTHONDIR"] = str(profile.parent)
+(profile / "startup").mkdir(exist_ok=True)
+(profile / "startup" / "kernels_of_a_page.py").write_text(asked_kernels.STARTUP, encoding="utf-8")
 
 
 def code_stamp() -> str:
@@ -64,6 +67,7 @@ myst_heading_anchors = 3
 
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE / "_build" / f"executed-{code_stamp()}")
+os.environ[asked_kernels.NOTES] = f"{nb_execution_cache_path}-kernels.txt"
 nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_execution_in_temp = True
@@ -103,6 +107,7 @@ def setup(app) -> None:
     app.connect("env-before-read-docs", thumbnails.drawn_first)
     app.connect("doctree-read", thumbnails.draw)
     app.connect("autodoc-process-docstring", api_pages.escape_bars, priority=100)
+    app.connect("build-finished", asked_kernels.check)
     app.connect("build-finished", offline.carry_mathjax)
     app.connect("build-finished", offline.lighten_sources)
     app.connect("build-finished", offline.lighten_figures)

@@ -91,6 +91,8 @@ EXCEPTIONS = {
     ("studies", "dae.analyses"): "the modes of a drivetrain, the type alone",
     ("studies", "dae.model"): "kernels of a run whose bodies turn about fixed axes, imported ahead of it",
     ("native", "gearmbs"): "an FMU says which version made it",
+    ("native", "contact"): "kernels of contact that are compiled ahead for exports go by their signature",
+    ("native", "drivetrain"): "so do laws of torques",
     ("campaigns", "gearmbs"): "the card of a data set says which version made it",
     ("cli", "gearmbs"): "the version",
     ("identify", "dae.results"): "what a result is asked of, the type alone",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import platform
 import shutil
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import types
 import zlib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gearmbs.kernels import cache, locks
@@ -266,6 +268,26 @@ def test_what_makes_the_files_is_in_their_names(tmp_path, monkeypatch):
     with (tmp_path / "jit.py").open("a") as stream:
         stream.write("CHANGED = True\n")
     assert cache.setting.__wrapped__() != known
+
+
+def test_patch_versions_make_no_other_names(monkeypatch):
+    """What fits is told by minor versions of Python, numba and LLVM's wrapper, and by no version of numpy."""
+    known = cache.setting()
+    for module in (cache.numba, cache.llvmlite):
+        minor, _, _ = module.__version__.rpartition(".")
+        with monkeypatch.context() as other:
+            other.setattr(module, "__version__", f"{minor}.987")
+            assert cache.setting.__wrapped__() == known
+            other.setattr(module, "__version__", "0.987.0")
+            assert cache.setting.__wrapped__() != known
+    with monkeypatch.context() as other:
+        other.setattr(np, "__version__", "2.987.0")
+        assert cache.setting.__wrapped__() == known
+        major, minor, _ = platform.python_version_tuple()
+        other.setattr(cache.platform, "python_version", lambda: f"{major}.{minor}.987")
+        assert cache.setting.__wrapped__() == known
+        other.setattr(cache.platform, "python_version", lambda: f"{major}.987.0")
+        assert cache.setting.__wrapped__() != known
 
 
 def test_interrupted_description(monkeypatch):

@@ -79,7 +79,22 @@ def compile_all(
         _compile_in_turn(wanted, report or (lambda line: None))
     else:
         compile_entries(wanted, report, workers)
+        if modules is None:
+            _compile_asked(report or (lambda line: None))
     return time.perf_counter() - start
+
+
+def _compile_asked(report: Report) -> None:
+    """Compile what is called, or linked, as only a list tells: it is little."""
+    from gearmbs.kernels import cache
+    from gearmbs.kernels.asked import asked, linked
+
+    for kernel, args in asked():
+        if not cache.stored(kernel, "entry", args):
+            kernel.compile(args)
+            report(f"{kernel.__module__}:{kernel.__name__} as it is called")
+    for kernel in linked():
+        kernel.part(kernel.declared_types()[0])
 
 
 def _compile_in_turn(wanted: list[Any], report: Report) -> None:

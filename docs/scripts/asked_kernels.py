@@ -1,0 +1,64 @@
+"""Holds that pages call no kernels but those that a wheel with kernels brings along.
+
+Each page's process notes the kernels that it calls (`note`, from the startup file that ``conf.py`` writes), beside the
+executed pages; the end of the build reads the notes.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+NOTES = "GEARMBS_ASKED_KERNELS"
+"""Environment variable with the file of notes."""
+
+STARTUP = "import asked_kernels\n\nasked_kernels.note()\ndel asked_kernels\n"
+"""What a page's process runs first, from a file of another name than this one's: its folder comes first there."""
+
+
+def note() -> None:
+    """Let kernels of the package that Python calls be noted, with their types, when they are compiled or loaded."""
+    from gearmbs.kernels import PLAIN
+
+    file = os.environ.get(NOTES)
+    if PLAIN or not file:
+        return
+    from numba.core import sigutils
+
+    from gearmbs.kernels.jit import Kernel
+
+    compiled = Kernel.compile
+
+    def noted(kernel, signature):
+        if kernel.__module__.startswith("gearmbs."):
+            types = ", ".join(map(str, sigutils.normalize_signature(signature)[0]))
+            with open(file, "a", encoding="utf-8") as notes:
+                notes.write(f"{kernel.__module__}:{kernel.__name__}\t{types}\n")
+        return compiled(kernel, signature)
+
+    Kernel.compile = noted
+
+
+def unlisted(notes: str) -> list[str]:
+    """Return what was noted and is compiled neither by its declared signature nor by the list, a line each."""
+    from gearmbs.kernels.asked import texts
+    from gearmbs.kernels.calls import address, entries, import_all, kernel_modules, kernels
+
+    import_all()
+    known = entries(kernels(kernel_modules()))
+    declared = {(address(k), ", ".join(map(str, k.declared_types()[0]))) for k in known}
+    found = {tuple(line.split("\t")) for line in notes.splitlines()}
+    return [f"{kernel} ({types})" for kernel, types in sorted(found - texts() - declared)]
+
+
+def check(app, exception) -> None:
+    """Refuse a build whose pages have called kernels that are not listed.
+
+    Raises
+    ------
+    RuntimeError
+        With their names and types.
+    """
+    file = Path(os.environ.get(NOTES, ""))
+    if exception is None and file.is_file() and (lines := unlisted(file.read_text(encoding="utf-8"))):
+        raise RuntimeError(f"gearmbs/kernels/asked.py: pages call kernels that are not listed: {'; '.join(lines)}")
