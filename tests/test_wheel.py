@@ -190,11 +190,19 @@ ROTATION = """
 """Calls one kernel; tells for which processor kernels are, and what came out."""
 
 
+STALE = ("dae.equations.rotation.rotation_matrix-0a.entry", "dae.no_more.kernel-0b.part")
+"""Kernels that cannot be read, or of a module that is no more, in a folder that is kept from one wheel to the next."""
+
+
 @pytest.fixture(scope="module")
 def with_kernels(wheel, tmp_path_factory):
     """Put the kernels of one module into the wheel, and install that."""
     folder = tmp_path_factory.mktemp("shipped")
-    made = ship(wheel, folder / "dist", ["gearmbs.dae.equations.rotation"])
+    kept = folder / "kernels" / "gearmbs"
+    kept.mkdir(parents=True)
+    for name in STALE:
+        (kept / name).write_bytes(b"of other sources")
+    made = ship(wheel, folder / "dist", ["gearmbs.dae.equations.rotation"], folder / "kernels")
     python, site = installed(made, folder)
     return made, python, site / "gearmbs" / "kernels" / "shipped"
 
@@ -203,6 +211,7 @@ def with_kernels(wheel, tmp_path_factory):
 def test_a_wheel_with_kernels_compiles_nothing(with_kernels, tmp_path, monkeypatch):
     """It is for one Python and one system; an empty home finds its kernels; who names a processor gets that one's."""
     made, python, along = with_kernels
+    assert not {path.name for path in along.iterdir()} & set(STALE)
     version = f"cp{sys.version_info.major}{sys.version_info.minor}"
     assert made.name.endswith(f"-{version}-{version}-manylinux_2_28_x86_64.whl")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
