@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -93,6 +94,9 @@ def _modes(train: Drivetrain, speed: float = 0.0) -> Modes:
         return linear_modes(m, t=after)
 
 
+MOVING = 0.15
+"""Share of the kinetic energy from which on a body is told to move."""
+
 CIRCULAR = 0.1
 """Area of an orbit, of that of a circle as long, from which on it goes one way: an ellipse of axes 20 : 1."""
 
@@ -145,7 +149,8 @@ def named_modes(train: Drivetrain, modes: Modes | None = None) -> xr.Dataset:
     Returns
     -------
     Dataset
-        Over ``mode``: ``frequency`` (Hz), ``damping_ratio``, ``name``, the largest part and what it does; over
+        Over ``mode``: ``frequency`` (Hz), ``damping_ratio``, ``name``, the largest part and what it does, and
+        ``moves``, the bodies with most of the kinetic energy, their share and how shafts move; over
         ``mode`` and ``part``: ``energy``, the share of the potential energy, and ``damping``, the part of the damping
         ratio that it gives; over ``mode`` and ``body``: ``kinetic``, the share of the kinetic energy. ``kind`` is what
         a part is. Table it by `mode_table`.
@@ -157,12 +162,14 @@ def named_modes(train: Drivetrain, modes: Modes | None = None) -> xr.Dataset:
     parts = with_rims(train, modes.parts, np.abs(modes.eigenvalues))
     known = part_kinds(train)
     kinds = [known.get(name, "other") for name in parts.names]
-    names = [_name(train, parts, kinds, row) for row in chosen]
+    names = [_name(train, parts, kinds, row, modes.body_names) for row in chosen]
+    moves = [_movers(train, modes, parts.kinetic[row], row) for row in chosen]
     return xr.Dataset(
         {
             "frequency": ("mode", modes.frequencies[chosen], {"units": "Hz"}),
             "damping_ratio": ("mode", modes.damping_ratios[chosen], {"units": "1"}),
             "name": ("mode", np.asarray(names, dtype=str)),
+            "moves": ("mode", np.asarray(moves, dtype=str)),
             "energy": (("mode", "part"), parts.energy[chosen], {"units": "1"}),
             "damping": (("mode", "part"), parts.damping[chosen], {"units": "1"}),
             "kinetic": (("mode", "body"), parts.kinetic[chosen], {"units": "1"}),
@@ -172,17 +179,57 @@ def named_modes(train: Drivetrain, modes: Modes | None = None) -> xr.Dataset:
     )  # fmt: skip
 
 
-def _name(train: Drivetrain, parts: Any, kinds: list[str], row: int) -> str:
-    """Return what a mode is called: its largest part; mounts of a housing, and planets of a stage, taken together."""
+def _movers(train: Drivetrain, modes: Modes, kinetic: np.ndarray, row: int) -> str:
+    """Return the two bodies that have most of the kinetic energy of a mode, with what a shaft does as a whole."""
+    told = []
+    for k in np.argsort(-kinetic)[:2]:
+        if kinetic[k] >= MOVING:
+            name = modes.body_names[k]
+            told.append(f"{name} {_way(train, name, modes.shapes[row, k])}{100.0 * kinetic[k]:.0f} %")
+    return ", ".join(told)
+
+
+def _way(train: Drivetrain, name: str, moved: np.ndarray) -> str:
+    """Return how a shaft moves most, by what its ends and the rims of its wheels do; nothing of other bodies."""
+    shaft = next((one for one in train.shafts if one.name == name), None)
+    if shaft is None:
+        return ""
+    axes = train.layout.seats[name].axes
+    centre, turned = np.abs(moved[:3] @ axes), np.abs(moved[3:] @ axes)
+    rim = max(
+        [wheel.gear.pitch_radius for wheel in train.wheels if wheel.shaft == name],
+        default=max(r for _, r in shaft.cylinders),
+    )
+    ways = {
+        "across": np.hypot(*centre[:2]), "along": centre[2], "tilts": 0.5 * shaft.length * np.hypot(*turned[:2]),
+        "turns": rim * turned[2],
+    }  # fmt: skip
+    return f"{max(ways, key=lambda way: float(ways[way]))} "
+
+
+def _name(train: Drivetrain, parts: Any, kinds: list[str], row: int, bodies: Sequence[str]) -> str:
+    """Return what a mode is called: its largest part; mounts of a housing, and planets of a stage, taken together.
+
+    Mounts count only if their housing moves more than any other body: where they give way to what a shaft does, its
+    bearings count together.
+    """
+    first = bodies[int(np.argmax(parts.kinetic[row]))]
     groups = {mesh.name: mesh.group for mesh in train.meshings}
     groups |= {pin: f"{stage.name} pins" for pin, (stage, _) in train.pins.items()}
     shares: dict[tuple[str, str], float] = {}
+    yielding = together = 0.0
     for name, kind, share in zip(parts.names, kinds, parts.energy[row]):
+        together += float(share) if kind == "bearing" else 0.0
         owner = _housing_of(train, name) if kind == "mount" else groups.get(name, name)
+        if kind == "mount" and owner != first:
+            yielding += float(share)
+            continue
         shares[kind, owner] = shares.get((kind, owner), 0.0) + float(share)
     if not shares or not max(shares.values()) > 0.0:
         return RIGID
-    (kind, name), _ = max(shares.items(), key=lambda item: item[1])
+    (kind, name), largest = max(shares.items(), key=lambda item: item[1])
+    if yielding > largest and together > largest and any(shaft.name == first for shaft in train.shafts):
+        return f"shaft '{first}' in its bearings"
     if kind == "mount":
         return f"housing '{name}' on its mounts"
     if kind == "shaft":
@@ -208,7 +255,7 @@ def _motion(model: ModalModel, strain: np.ndarray) -> str:
 
 
 def mode_table(named: xr.Dataset) -> pd.DataFrame:
-    """Return named modes as a table: frequency, damping ratio, name, and the share of each kind of part."""
+    """Return named modes as a table: frequency, damping ratio, name, share of each kind of part, what moves."""
     kinds = np.asarray(named["kind"].values)
     rows = {
         "frequency_hz": named["frequency"].values,
@@ -219,7 +266,7 @@ def mode_table(named: xr.Dataset) -> pd.DataFrame:
     sums = {kind: energy[:, kinds == kind].sum(axis=1) for kind in KINDS if (kinds == kind).any()}
     rest = 1.0 - energy.sum(axis=1)
     sums["other"] = sums.get("other", 0.0) + rest
-    return pd.DataFrame({**rows, **sums}, index=named["mode"].values)
+    return pd.DataFrame({**rows, **sums, "moves": named["moves"].values}, index=named["mode"].values)
 
 
 UNEXCITED = 1e-9

@@ -26,6 +26,9 @@ TRACK_MOMENTS = 60
 """Moments of a run-up at which mesh harmonics are told."""
 TRACK_CYCLES = 16.0
 """Mesh cycles in a window around each."""
+SET_BACK = 0.1
+"""Mesh cycles by which a wheel may swing back on its way, as in a resonance, its angle then resting instead; of one
+that swings further the angle is the drive's by their ratio."""
 
 
 def bearing_names(train: Drivetrain) -> list[str]:
@@ -48,8 +51,10 @@ def signals_of(train: Drivetrain, record: xr.Dataset) -> tuple[list[str], np.nda
     )
 
 
-def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: TrainColumns) -> xr.DataArray:
-    """Return the RMS of each signal at the harmonics of each mesh along a run-up or coast-down.
+def mesh_tracks(
+    train: Drivetrain, run: RunSettings, record: xr.Dataset, known: TrainColumns
+) -> tuple[xr.DataArray, list[str]]:
+    """Return the RMS of each signal at the harmonics of each mesh along a run-up or coast-down, and what it lacks.
 
     Returns
     -------
@@ -57,6 +62,8 @@ def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: 
         Dims (signal, mesh, harmonic, moment); ``track_time`` (s), ``track_speed`` (of the first drive's shaft, rad/s)
         and, by mesh, ``track_frequency`` (Hz) of each moment. A moment is the middle of a window of some mesh cycles,
         see `gearmbs.signals.order_track`; NaN where a mesh does not turn enough for one.
+    list of str
+        Of each mesh that has none at all why.
     """
     from gearmbs.signals import SignalError, order_track
 
@@ -67,24 +74,42 @@ def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: 
     rms = np.full((len(names), len(train.meshings), run.harmonics, moments.size), np.nan)
     frequency = np.zeros((len(train.meshings), moments.size))
     shafts = list(train.turning)
+    lacking: list[str] = []
     for k, mesh in enumerate(train.meshings):
         teeth, turned = mesh.gears[0].teeth, driver_angle(train, known, mesh)
         # the angle in mesh cycles: an order is then a harmonic of the mesh
-        angle = xr.DataArray(teeth * np.abs(np.interp(t, known.t, turned)), dims="time",
-                             coords={"time": t}, attrs={"units": "rad"})  # fmt: skip
+        cycles = teeth * np.abs(np.interp(t, known.t, turned))
+        furthest = np.maximum.accumulate(cycles)
+        if (furthest - cycles).max() < SET_BACK * TURN:
+            cycles = furthest
+        elif not mesh.stage:
+            led = train.drives[0].shaft
+            ratio = abs(train.speeds[mesh.bodies[0]] / train.speeds[led])
+            cycles = teeth * ratio * np.abs(np.interp(t, known.t, known.turned[:, shafts.index(led)]))
+        angle = xr.DataArray(cycles, dims="time", coords={"time": t}, attrs={"units": "rad"})
         speed = driver_angle(train, known, mesh, of_speed=True)
         frequency[k] = teeth * np.abs(np.interp(moments, known.t, speed)) / (2.0 * np.pi)
         signal = make_signal(signals, float(run.output_rate(train)), units="1", channels=names, t0=float(t[0]))
+        few = (
+            f"mesh '{mesh.name}': mesh_track has no levels: the record has {np.ptp(cycles) / TURN:.3g} cycles of it, a "
+            f"level takes {TRACK_CYCLES:g}; give a longer run.duration"
+        )
+        if np.ptp(cycles) < TRACK_CYCLES * TURN:
+            lacking.append(few)
+            continue
         try:
             found = order_track(signal, orders=orders.tolist(), phase=angle, scaling="rms", revolutions=TRACK_CYCLES)
-        except SignalError:
+        except SignalError as error:
+            lacking.append(f"mesh '{mesh.name}': mesh_track has no levels: {error}")
             continue
         at = found["time"].values
         inside = (moments >= at[0]) & (moments <= at[-1])
+        if not inside.any():
+            lacking.append(few)
         for h in range(run.harmonics):
             for n in range(len(names)):
                 rms[n, k, h, inside] = np.interp(moments[inside], at, found.values[:, h, n])
-    return xr.DataArray(
+    tracks = xr.DataArray(
         rms, dims=("signal", "mesh", "harmonic", "moment"),
         coords={"signal": names, "mesh": [m.name for m in train.meshings], "harmonic": orders,
                 "track_time": ("moment", moments, {"units": "s"}),
@@ -93,6 +118,7 @@ def mesh_tracks(train: Drivetrain, run: RunSettings, record: xr.Dataset, known: 
                 "track_frequency": (("mesh", "moment"), frequency, {"units": "Hz"})},
         attrs={"long_name": "RMS at the harmonics of the mesh frequencies, in the signals' own units"},
     )  # fmt: skip
+    return tracks, lacking
 
 
 def harmonic_levels(

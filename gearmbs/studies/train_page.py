@@ -259,19 +259,24 @@ class TrainPage:
         return lines
 
     def _modes(self) -> list[str]:
-        table = mode_table(named_modes(self.train)).head(MODES)
-        shares = [name for name in table.columns if name not in ("frequency_hz", "damping_ratio", "name", "other")]
+        whole = mode_table(named_modes(self.train))
+        table = whole.head(MODES)
+        words = ("frequency_hz", "damping_ratio", "name", "other", "moves")
+        shares = [name for name in table.columns if name not in words]
         rows = [
             [
                 f"{row['frequency_hz']:.5g}",
                 f"{row['damping_ratio']:.3g}",
                 row["name"],
+                row["moves"],
                 *(f"{row[s]:.2f}" for s in shares),
             ]
             for _, row in table.iterrows()
         ]
-        lines = ["## Modes under load", "", markdown_table(["Hz", "of critical damping", "largest part",
+        lines = ["## Modes under load", "", markdown_table(["Hz", "of critical damping", "largest part", "what moves",
                  *(f"share of {name}" for name in shares)], rows), ""]  # fmt: skip
+        if len(whole) > MODES:
+            lines += [f"The slowest {MODES} of {len(whole)}; `mode_table(named_modes(train))` has all.", ""]
         if self.campbell is None:
             return [*lines, f"No mode lies below {self.maximum:.5g} Hz.", ""]
         found = [

@@ -388,8 +388,11 @@ def evaluated(train: Drivetrain, run: RunSettings, known: TrainColumns, solution
     for remark in of_bearings:
         warn(f"drivetrain '{train.name}': {remark}")
     if train.changes_speed:
-        out["mesh_track"] = mesh_tracks(train, run, out, known)
-        out.attrs = attributes(train, run, solution)
+        out["mesh_track"], lacking = mesh_tracks(train, run, out, known)
+        for remark in lacking:
+            warn(f"drivetrain '{train.name}': {remark}")
+        remarks = "; ".join([*lacking, *of_bearings]) or "none"
+        out.attrs = attributes(train, run, solution) | {"remarks": remarks}
         return out
     held = held_speeds(train, out)
     out["mesh_rms"] = harmonic_levels(train, run, out, rate, known, start, stop, held)

@@ -260,7 +260,8 @@ def test_modes_are_called_by_their_largest_part():
     table = mode_table(named_modes(housed(time=0.0)))
     assert table["name"].iloc[0] == "housing 'case' on its mounts"
     kinds = ["mesh", "shaft", "bearing", "housing", "mount", "load", "other"]
-    assert list(table.columns[3:]) == kinds
+    assert list(table.columns[3:]) == [*kinds, "moves"]
+    assert table["moves"].iloc[0].startswith("case ")
     np.testing.assert_allclose(table[kinds].sum(axis=1), 1.0, atol=1e-9)
 
 
@@ -442,3 +443,19 @@ def test_what_a_housing_of_finite_elements_is_refused_for():
     ):
         with pytest.raises(DrivetrainError, match=says(*message)):
             _ = train.with_parts(replace(train.housings[0], **changed)).modal_models
+
+
+@pytest.mark.slow
+def test_a_mode_in_which_shafts_move_is_not_called_by_the_mounts_that_give_way():
+    """In bearings that are soft along them shafts slide; by its mounts only the case is called, if it moves most."""
+    soft = (2e8, 2e8, 2e6)
+    made = housed(time=0.0)
+    made = made.with_parts(*(replace(b, stiffness=soft) for b in made.bearings))
+    named = named_modes(made)
+    for name, moves, kinetic in zip(named.name.values, named.moves.values, named.kinetic.values):
+        body = str(named.body.values[int(np.argmax(kinetic))])
+        assert moves.startswith(f"{body} ")
+        if str(name).endswith("on its mounts"):
+            assert body == "case"
+    sliding = int(np.argmax(named.kinetic.sel(body=["input", "output"]).sum("body").values[:6]))
+    assert " along " in str(named.moves.values[sliding])

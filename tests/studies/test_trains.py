@@ -3,6 +3,7 @@
 import json
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,20 +13,24 @@ from typer.testing import CliRunner
 from gearmbs.cli import app
 from gearmbs.drivetrain import (
     Accelerometer,
+    Drivetrain,
     DrivetrainError,
     ElasticBearing,
+    GearMesh,
     Housing,
     IdealBearing,
     InductionMotor,
     Laser,
     Mount,
     RunSettings,
+    Shaft,
     SpeedDrive,
     SpeedSensor,
     TorqueDrive,
     TorqueLoad,
     TorqueSensor,
 )
+from gearmbs.gears import GearSpec
 from gearmbs.saving import save
 from gearmbs.signals import analyse, order_track, to_signal
 from gearmbs.signals.analysis.bands import harmonic_amplitudes
@@ -338,3 +343,30 @@ def test_levels_follow_the_angle_where_the_speed_drifts():
     followed = np.abs(harmonic_amplitudes(*by_angle(signal, cycles), orders))
     assert plain[2, 1] < 0.6
     np.testing.assert_allclose(followed, [[1, 0], [0, 0], [0, 1]], atol=0.02)
+
+
+@pytest.mark.slow
+def test_a_light_wheel_that_swings_back_in_a_run_up_has_levels_by_the_angle_of_the_drive():
+    """The lay shaft falls back by more than a tenth of a mesh cycle near a resonance; a mesh of few cycles says so."""
+    wheel = partial(GearSpec, module="3 mm", face_width="25 mm", bore_radius="15 mm")
+    pairs = {"in": {"z1": ("60 mm", wheel(19))}, "out": {"z4": ("150 mm", wheel(68))},
+             "lay": {"z2": ("60 mm", wheel(61)), "z3": ("150 mm", wheel(17))}}  # fmt: skip
+    springs, curve = {"stiffness": (2e8, 2e8, 1e8), "damping_time": 2e-5}, [["20 ms", "300 rpm"], ["1.5 s", "1800 rpm"]]
+    two = Drivetrain(
+        "two",
+        shafts=[Shaft(name=name, wheels=wheels) for name, wheels in pairs.items()],
+        meshes=[GearMesh(name="one", driver="z1", driven="z2"), GearMesh(name="two", driver="z3", driven="z4")],
+        bearings=[
+            ElasticBearing(name=f"{name} {z}", shaft=name, station=z, **springs) for name in pairs for z in (0.01, 0.19)
+        ],
+        drives=[SpeedDrive(name="motor", shaft="in", speed="1800 rpm", curve=curve)],
+        loads=[TorqueLoad(name="brake", shaft="out", torque="100 N m")],
+        running=True,
+    )
+    found = run_train(two, RunSettings(settling=0.02, duration=0.9))
+    assert found.attrs["remarks"] == "none"
+    forces = found.mesh_track.sel(signal="force of two", mesh="two")
+    assert np.isfinite(forces.values).mean() > 0.5
+    with pytest.warns(UserWarning, match=says("mesh 'two'", "16", "run.duration")):
+        short = run_train(two, RunSettings(settling=0.02, duration=0.3))
+    assert "mesh 'two'" in short.attrs["remarks"]
