@@ -64,6 +64,7 @@ def seen_from(pose_a, pose_b, half, out):
     for c in range(3):
         middle = reach = 0.0
         for r in range(3):
+            # the box about b's box in a's frame: its middle, and the sum of its half edges' shares along each axis
             middle -= out[3 * r + c] * out[9 + r]
             reach += abs(out[3 * r + c]) * half[r]
         reach *= 1.0 + 1e-9
@@ -110,6 +111,7 @@ def block_clear(solid, block, move, anchor, floor, work):
     for q in range(3):
         middle[q] = 0.5 * (block[q] + block[3 + q])
         square += (block[3 + q] - middle[q]) ** 2
+    # all vertices are within the ball about the block's box
     radius = np.sqrt(square)
     brought(move, middle, local)
     if within(local, anchor, radius - floor):
@@ -119,12 +121,14 @@ def block_clear(solid, block, move, anchor, floor, work):
         for q in range(3):
             anchor[q] = local[q]
         anchor[3] = phi
+    # a distance changes by no more than its point moves, at most the radius
     return (phi + floor) * LESS > radius
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def within(x, anchor, radius):
     """Return whether a ball about x is within the ball about the anchor that holds nothing of the solid."""
+    # the ball about the anchor with its distance holds nothing of the solid
     left = anchor[3] * LESS - radius
     if left <= 0.0:
         return False
@@ -154,6 +158,7 @@ def vertices_below(rows, count, first, swapped, solid_a, solid_b, bearing, work)
     half_lengths(solid_b[0], solid_b[1], half)
     seen_from(pose_a, pose_b, half, move)
     anchor[3] = from_solid(solid_b, move[9:12], grad, hess, work[0:14])
+    # the origin of a is farther from b than a reaches
     if anchor[3] * LESS > solid_a[1][3]:
         return count
     for q in range(3):
@@ -174,6 +179,7 @@ def vertices_below(rows, count, first, swapped, solid_a, solid_b, bearing, work)
                     anchor[q] = local[q]
                 anchor[3] = phi
                 continue
+            # less deep than what bears, of the deepest so far
             if -phi < floor:
                 continue
             floor = max(floor, -bearing * phi)
@@ -187,6 +193,7 @@ def vertices_below(rows, count, first, swapped, solid_a, solid_b, bearing, work)
                 row[pt.HESSIAN + q] = hess[q]
             row[pt.DEPTH] = -phi
             for q in range(3):
+                # half-way between the vertex and the surface
                 row[pt.PLACE + q] = row[pt.VERTEX_PLACE + q] - 0.5 * phi * row[pt.NORMAL + q]
             row[pt.VERTEX] = row[pt.POOL] = first + v
             row[pt.WEIGHT], row[pt.SWAPPED], row[pt.GAIN] = weights[v], swapped, 1.0

@@ -62,6 +62,7 @@ def add_root(d0, d1, d2, factor, w, point, hess):
     """Add factor sqrt(w D w), D diagonal: its gradient to ``point`` and its Hessian to ``hess``."""
     g = (d0 * w[0], d1 * w[1], d2 * w[2])
     d = (d0, d1, d2)
+    # h = sqrt(w D w): h_w = D w / h, h_ww = (D - h_w h_w^T) / h
     root = np.sqrt(max(g[0] * w[0] + g[1] * w[1] + g[2] * w[2], 1e-300))
     for q in range(3):
         point[q] += factor * g[q] / root
@@ -82,12 +83,14 @@ def support(kind, sizes, w, point, hess):
     elif kind == ELLIPSOID:
         add_root(sizes[0] ** 2, sizes[1] ** 2, sizes[2] ** 2, 1.0, w, point, hess)
     elif kind == BOX:
+        # a box reaches sum_k size_k |w_k|, each |w_k| rounded
         add_root(1.0 + square, square, square, sizes[0], w, point, hess)
         add_root(square, 1.0 + square, square, sizes[1], w, point, hess)
         add_root(square, square, 1.0 + square, sizes[2], w, point, hess)
     elif kind == FRUSTUM:
         _frustum(sizes, w, point, hess)
     else:
+        # a torus: its circle's radial reach, and the tube's in any direction
         add_root(1.0 + square, 1.0 + square, square, sizes[0], w, point, hess)
         add_root(1.0, 1.0, 1.0, sizes[1], w, point, hess)
 
@@ -111,11 +114,13 @@ def _frustum(sizes, w, point, hess):
     g = np.empty(3)
     m = np.empty(3)
     for q in range(3):
+        # gradients of the difference and of the root
         g[q] = (top - bottom) * s[q] + (2.0 * half if q == 2 else 0.0)
         m[q] = (difference * g[q] + c * w[q]) / root
     for q in range(3):
         point[q] = 0.5 * ((bottom + top) * s[q] + m[q])
         for p in range(3):
+            # m m_ww = g g^T + G G_ww + c - m_w m_w^T
             second = g[q] * g[p] + difference * (top - bottom) * ss[3 * q + p] + (c if q == p else 0.0) - m[q] * m[p]
             hess[3 * q + p] = 0.5 * ((bottom + top) * ss[3 * q + p] + second / root)
     point[2] += sizes[3]
@@ -160,6 +165,7 @@ def overlap(kind_a, sizes_a, kind_b, sizes_b, n, work):
         work[LOCAL + 6 : TRIAL],
     )
     for c in range(3):
+        # the direction -n in a's frame; back in b's, y = R y_a + centre and S = R S_a R^T
         w[c] = -(move[c] * n[0] + move[3 + c] * n[1] + move[6 + c] * n[2])
     support(kind_a, sizes_a, w, y, hess)
     for r in range(3):
@@ -172,6 +178,7 @@ def overlap(kind_a, sizes_a, kind_b, sizes_b, n, work):
             work[S_A + 3 * r + c] = b0 * move[3 * c] + b1 * move[3 * c + 1] + b2 * move[3 * c + 2]
     if kind_b == BOX:
         for q in range(3):
+            # the corner of the box on the side of n; where a component of n vanishes, the middle of its side
             work[Y_B + q] = work[SIDE + q] * sizes_b[q]
         for q in range(9):
             work[S_B + q] = 0.0
@@ -203,6 +210,7 @@ def directions(n, work):
         i = 0 if work[FREE] > 0.0 else 1
         k = 2 if work[FREE + 2] > 0.0 else 1
         u[0] = u[1] = u[2] = 0.0
+        # n turns in the plane of its two free components
         u[i], u[k] = -n[k], n[i]
         return 1
     k = 0
@@ -242,15 +250,18 @@ def newton_step(n, o, many, widest, work, out):
     for q in range(3):
         gu += u[q] * (work[Y_B + q] - work[Y_A + q])
         gv += v[q] * (work[Y_B + q] - work[Y_A + q]) if many == 2 else 0.0
+    # second derivatives of o on the sphere: U^T (S_a + S_b) U - o
     huu = bent(work, u, u) - o
     low = high = huu
     if many == 2:
         huv, hvv = bent(work, u, v), bent(work, v, v) - o
+        # principal directions of a symmetric 2 x 2 matrix
         angle = 0.5 * np.arctan2(2.0 * huv, huu - hvv)
         cosine, sine = np.cos(angle), np.sin(angle)
         high = cosine * cosine * huu + 2.0 * cosine * sine * huv + sine * sine * hvv
         low = sine * sine * huu - 2.0 * cosine * sine * huv + cosine * cosine * hvv
     one, other = cosine * gu + sine * gv, -sine * gu + cosine * gv
+    # Newton's step -g / h, down the slope where h is negative, and no longer than ``widest``
     first = -one / max(abs(high), max(abs(one) / widest, 1e-300))
     second = -other / max(abs(low), max(abs(other) / widest, 1e-300)) if many == 2 else 0.0
     for q in range(3):
@@ -270,6 +281,7 @@ def newton_step(n, o, many, widest, work, out):
 @njit(cache=True, error_model="numpy")
 def turn_by(n, way, kind_b, work, out):
     """Write n turned along ``way``, to where a component of n against a box vanishes at most; return which, or -1."""
+    # the part of the way at which the first component vanishes
     part, at = 1.0, -1
     if kind_b == BOX:
         for q in range(3):

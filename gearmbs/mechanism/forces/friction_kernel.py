@@ -89,6 +89,7 @@ def clear(rows, out, value):
 def product(rows, out, a, b):
     """Write the product of two quantities, ``out`` none of them."""
     for k in range(1, rows.shape[1]):
+        # d(a b) = a db + b da
         rows[out, k] = rows[a, 0] * rows[b, k] + rows[b, 0] * rows[a, k]
     rows[out, 0] = rows[a, 0] * rows[b, 0]
 
@@ -111,6 +112,7 @@ def length_of(rows, out, first, last, tiny):
     length = np.sqrt(square)
     for c in range(first, last):
         for k in range(1, rows.shape[1]):
+            # l = sqrt(sum x^2 + tiny^2): dl = sum x dx / l
             rows[out, k] += rows[c, 0] / length * rows[c, k]
     rows[out, 0] = length
 
@@ -154,6 +156,7 @@ def turning(rows, out, frames, f, axis, lever):
     x, y, z = difference(frames, FRAME_W)
     component(rows, out, frames, f, axis, x, y, z)
     for c in range(3):
+        # and by the angular velocities themselves: along the axis for I, against it for J
         rows[out, 1 + 9 + c] = frames[f, FRAME_A + 3 * c + axis]
         rows[out, 1 + 21 + c] = -frames[f, FRAME_A + 3 * c + axis]
     for k in range(rows.shape[1]):
@@ -173,6 +176,7 @@ def sliding(rows, out, frames):
         c1, c2 = (c + 1) % 3, (c + 2) % 3
         a = frames[1, FRAME_A + 3 * c + 2]
         a1, a2 = frames[1, FRAME_A + 3 * c1 + 2], frames[1, FRAME_A + 3 * c2 + 2]
+        # s = a . (v_I - v_J - w x d): by d it is -(a x w), by w -(d x a)
         away = a1 * base[c2] - a2 * base[c1]
         rows[out, 1 + c], rows[out, 13 + c] = -away, away
         rows[out, 7 + c], rows[out, 19 + c] = a, -a
@@ -192,6 +196,7 @@ def pressing(ints, reals, frames, inputs, rows):
             out = AXES + 3 * part + axis
             component(rows, out, frames, f, axis, inputs[3 * part], inputs[3 * part + 1], inputs[3 * part + 2])
             for c in range(3):
+                # and by the reaction, of which it is a component
                 rows[out, first + 3 * part + c] = frames[f, FRAME_A + 3 * c + axis]
     for k, low, high, tiny in (
         (PER_RADIAL, 0, 2, TINY_FORCE),
@@ -212,6 +217,7 @@ def pressing(ints, reals, frames, inputs, rows):
     component(rows, HELP, frames, 1, 2, x, y, z)
     for c in range(3):
         rows[HELP, 1 + c], rows[HELP, 13 + c] = frames[1, FRAME_A + 3 * c + 2], -frames[1, FRAME_A + 3 * c + 2]
+    # bending is carried by a couple at the ends of the overlap: force = moment / overlap
     overlap = reals[OVERLAP] + reals[OVERLAP_SLOPE] * (rows[HELP, 0] - reals[START])
     function_of(rows, HELP, HELP, 1.0 / overlap, -reals[OVERLAP_SLOPE] / overlap**2)
     product(rows, FACTOR, PART, HELP)
@@ -232,10 +238,12 @@ def by_velocity(reals, slips, rows):
     v, transition = rows[SPEED, 0], reals[TRANSITION]
     if v <= transition:
         static, ratio = reals[LIMIT_STATIC], v / transition
+        # g / V of the cubic g = mu_s r (3 - r^2) / 2, r = V / V_t, finite at rest
         value, slope = 0.5 * static / transition * (3.0 - ratio * ratio), -static * ratio / transition**2
         function_of(rows, FACTOR, SPEED, value, slope)
     else:
         ramp(rows, STEP, transition, reals[LIMIT_STATIC], reals[LIMIT_DYNAMIC])
+        # above it STEP from mu_s to mu_d, over V
         function_of(rows, HELP, SPEED, 1.0 / v, -1.0 / (v * v))
         product(rows, FACTOR, STEP, HELP)
     for k in range(slips):
@@ -247,8 +255,10 @@ def by_deformation(reals, slips, states, want, rows, rates, jac):
     """Write the rates z_k' and mu_k = mu_s (z_k + tau z_k') / D."""
     transition, stiffness = reals[TRANSITION], reals[PER_DEFORMATION]
     ramp(rows, STEP, transition, reals[LIMIT_STATIC], reals[LIMIT_DYNAMIC])
+    # V / g, by which deformations fade
     function_of(rows, STEP, STEP, 1.0 / rows[STEP, 0], -1.0 / rows[STEP, 0] ** 2)
     product(rows, FACTOR, SPEED, STEP)
+    # damping of the deformation, none in full slip
     tau = reals[DEFORMATION] / transition
     ramp(rows, SHARE, transition, tau, 0.0)
     for k in range(slips):
@@ -285,6 +295,7 @@ def resisting(ints, reals, slips, rows):
         lever = reals[LEVER] if kind == BALL or (kind == CYLINDER and k == 1) else 1.0
         product(rows, LOAD + k, MU + k, PRESSING)
         for q in range(rows.shape[1]):
+            # -(mu_k N) r, and what the unloaded joint keeps
             rows[LOAD + k, q] *= -lever
         add(rows, LOAD + k, -(reals[KEPT_TORQUE] if torque else reals[KEPT_FORCE]), MU + k)
         if kind != BALL:
@@ -293,6 +304,7 @@ def resisting(ints, reals, slips, rows):
         most = reals[MAX_TORQUE]
         length_of(rows, HELP, LOAD, LOAD + 3, TINY * most)
         if rows[HELP, 0] > most:
+            # a vector beyond its limit is shortened, its direction stays
             function_of(rows, HELP, HELP, most / rows[HELP, 0], -most / rows[HELP, 0] ** 2)
             for k in range(3):
                 product(rows, PART, LOAD + k, HELP)
