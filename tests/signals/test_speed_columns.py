@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -132,6 +134,19 @@ def test_a_foreign_line_beside_the_mesh_is_not_taken_for_it(beside, height):
     values = 2 * np.cos(23 * angle) + np.cos(46 * angle) + height * 2 * np.cos(23 * (1 + beside) * angle) + noise
     report = analyse(pd.DataFrame({"time": t, "acc [m/s^2]": values, "speed [rpm]": np.full(t.size, 1500.0)}), 23)
     np.testing.assert_allclose(report.harmonics["orders"].values[:2, 0], [np.sqrt(2.0), np.sqrt(0.5)], rtol=0.05)
+
+
+@pytest.mark.parametrize("beside", [2e-4, -4e-4, 8e-4])
+def test_a_stronger_line_that_no_window_tells_from_the_mesh_is_not_taken_for_it(beside):
+    """One to four lines of the spectrum away: the sum beats. 1.37 of it had been the mesh's, without a remark."""
+    t = np.arange(102400) / 12800.0
+    angle = 2 * np.pi * 25.0 * t
+    noise = 0.3 * np.random.default_rng(1).standard_normal(t.size)
+    values = 0.8 * np.cos(23 * angle) + 2 * np.cos(23 * (1 + beside) * angle + 0.4) + noise
+    report = analyse(pd.DataFrame({"time": t, "acc [m/s^2]": values, "speed [rpm]": np.full(t.size, 1500.0)}), 23)
+    assert any(re.search(says("CHECK THE SPEED", "one of which"), note) for note in report.notes)
+    assert report.speed == pytest.approx(50.0 * np.pi, rel=1e-9)
+    assert report.harmonics["orders"].values[0, 0] == pytest.approx(0.8 / np.sqrt(2.0), rel=0.3)
 
 
 def test_a_foreign_line_alone_beside_a_told_speed_is_said_and_not_taken():

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from gearmbs.signals.analysis.report import markdown_table
-from gearmbs.signals.encoders.unseen import unseen_in_words
+from gearmbs.signals.encoders.cycle import unseen_in_words
 
 LISTED = 4
 """Harmonics whose lengths a report names."""

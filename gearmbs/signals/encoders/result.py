@@ -13,13 +13,12 @@ import pandas as pd
 from scipy import stats
 
 from gearmbs._display import Shown
-from gearmbs.signals.encoders.cycle import fall, missing_beyond, noise_within
+from gearmbs.signals.encoders.cycle import fall, missing_beyond, noise_within, unseen, unseen_mesh
 from gearmbs.signals.encoders.estimate import Found, amplitude_interval
 from gearmbs.signals.encoders.lengths import ACCURACY
 from gearmbs.signals.encoders.orders import Gearing, beside
 from gearmbs.signals.encoders.pulses import TURN
 from gearmbs.signals.encoders.report import SHAFTS, markdown_of, verdict_of
-from gearmbs.signals.encoders.unseen import unseen, unseen_mesh
 from gearmbs.signals.errors import SignalError
 from gearmbs.units import Quantity, to_si
 
@@ -351,7 +350,8 @@ class MeasuredTransmissionError(Shown):
         DataFrame
             ``F_i`` total range, ``f_i`` largest range within one pitch, ``f_l`` range of the long waves, orders below
             half the mesh order, ``f_k`` range of the short waves, all others, nan where no mesh harmonic is seen;
-            ``within`` what F_i is known to, with what orders may add that are not seen (`encoders.unseen`).
+            ``within`` what F_i is known to, with what orders may add that are not seen
+            (`gearmbs.signals.encoders.cycle`).
         """
         rows, load = [], self._load(load)
         lacking, mesh_seen = [unseen(self, load, at) for at in (0, 1)], any(one.harmonic for one in self.lines)

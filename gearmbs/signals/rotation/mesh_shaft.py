@@ -43,6 +43,11 @@ NEVER_FADES = 0.3
 TOLD_APART, BOTH = 4.0, 0.25
 """Lines of the spectrum from which two lines are told apart, where a Hann window lets through 0.3 %, and the part of
 the one from which the other stands, too."""
+BLOCKS, SMOOTHED = 512, 25
+"""Parts of a record by which lines beside each other are told, and how many of these are averaged."""
+NEAR_LINE, LEAST_APART = 0.4, 0.5
+"""Lines of the spectrum by which that of two that was found may be off: the other pulls it; and those below which two
+are one."""
 FOLLOWED = 0.1
 """Turns of the shaft by which the mesh line may wander to be followed; `phase_from_line` follows it by 0.15."""
 LINES_OFF = 2.0
@@ -143,7 +148,7 @@ def _calibrated(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, not
     if fades or abs(off) > MEASURED or _turns_beside(found, teeth, shaft.speed):
         notes += _remark_off(found, shaft.speed, gmf, own, shaft.range is not None)
         return shaft
-    if lines > TOLD_APART and _stands_beside(_over_angle(signal, shaft, teeth) if steady else over, gmf, off):
+    if _stands_beside(_over_angle(signal, shaft, teeth) if steady else over, gmf, off, lines):
         notes.append(
             f"CHECK THE SPEED: lines stand at the mesh of {own} and {100.0 * off:+.2f} % off it, one of which is "
             "something else's. The speed is used as it is."
@@ -159,12 +164,45 @@ def _calibrated(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft, not
     return shaft._replace(phase=same, speed=shaft.speed * (1.0 + off), range=low_high)
 
 
-def _stands_beside(over: xr.DataArray, gmf: float, off: float) -> bool:
-    """Return whether a line stands at a mesh frequency (Hz) beside that which is a share off it, in any channel."""
+def _stands_beside(over: xr.DataArray, gmf: float, off: float, lines: float) -> bool:
+    """Return whether a line stands at a mesh frequency (Hz) beside that which is a share off it, in any channel.
+
+    Those that a window does not tell apart, so many lines of the spectrum from each other, are fitted together: of two
+    the sum beats, of one that wanders it does not.
+    """
+    if lines < TOLD_APART:
+        return any(_two_lines(x, math.tau * gmf / rate_of(over), off, lines) for x in over.values.T)
     angle = math.tau * gmf / rate_of(over) * np.arange(over.sizes["time"])
     window = np.hanning(angle.size)
     turning, moved = np.exp(-1j * angle), np.exp(-1j * (1.0 + off) * angle)
     return any(abs((window * x) @ turning) > BOTH * abs((window * x) @ moved) for x in over.values.T)
+
+
+def _two_lines(values: np.ndarray, told: float, off: float, lines: float) -> bool:
+    """Return whether two lines beat, one at an angle a sample (rad), the other a share off it.
+
+    Means over blocks of the record, turned back by the told line, hold both as slow turns; that of the other line is
+    found where least is left.
+    """
+    count = min(BLOCKS, values.size // 2)
+    size = values.size // count
+    turned = (values[: count * size] - values.mean()) * np.exp(-1j * told * np.arange(count * size))
+    slow = turned.reshape(count, size).mean(axis=1)
+    turn = math.tau * np.arange(count) / count
+    best = (math.inf, np.zeros(2, dtype=complex))
+    for beside in math.copysign(1.0, off) * (lines + NEAR_LINE * np.linspace(-1.0, 1.0, 13)):
+        if abs(beside) < LEAST_APART:
+            continue
+        terms = np.stack([np.ones(count), np.exp(1j * beside * turn)], axis=1)
+        found, *_ = np.linalg.lstsq(terms, slow, rcond=None)
+        left = float(np.sum(np.abs(slow - terms @ found) ** 2))
+        best = min(best, (left, found), key=lambda one: one[0])
+    here, there = np.abs(best[1])
+    if here <= BOTH * there:
+        return False
+    # one line that wanders has another line's part there, too, but an even height
+    smooth = np.abs(np.convolve(slow, np.hanning(SMOOTHED + 2)[1:-1] / (0.5 * (SMOOTHED + 1)), "valid"))
+    return float(np.ptp(np.percentile(smooth, [5.0, 95.0]))) > BOTH * float(smooth.mean())
 
 
 def _over_angle(signal: xr.DataArray, shaft: Shaft, teeth: int) -> xr.DataArray:
