@@ -256,3 +256,25 @@ def test_columns_of_times_in_lvm_are_those_of_the_channels_behind_them(case, inc
         alone = read_signal(tmp_path / "m.lvm", channels=["B"])
         assert alone.attrs["sampling_rate"] == pytest.approx(1.0 / (times[1] - times[0]))
         assert float(alone["time"][0]) == pytest.approx(times[0])
+
+
+SLOW = np.arange(0.0, 6.0, 0.01)
+SWING = 1500.0 + 100.0 * np.sin(2 * np.pi * 0.3 * SLOW)
+SPEEDS = {
+    "whole": (SLOW, SWING, False),
+    "run-up": (SLOW[::10], 300.0 * SLOW[::10], False),
+    "constant, short": (SLOW[:500], 0.0 * SLOW[:500] + 1500.0, False),
+    "short": (SLOW[:400], SWING[:400], True),
+    "late": (SLOW[50:], SWING[50:], True),
+    "coarse": (SLOW[::100], SWING[::100], True),
+}
+
+
+@pytest.mark.parametrize("name", SPEEDS)
+def test_a_speed_that_ends_early_or_is_coarse_is_told(tmp_path, name):
+    """Lines by it had been a tenth of what they are, with a remark on interpolation alone."""
+    times, speed, told = SPEEDS[name]
+    base = np.arange(6000) / 1000.0
+    scipy.io.savemat(tmp_path / "r.mat", {"t_A": base, "A": np.cos(300.0 * base), "t_speed": times, "speed": speed})
+    notes = read_signal(tmp_path / "r.mat").attrs["notes"]
+    assert any("CHECK THE SPEED" in note for note in notes) == told

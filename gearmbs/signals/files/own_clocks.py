@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearmbs.signals.errors import SignalFileError
-from gearmbs.signals.signal.labels import may_be_slow, may_be_times
+from gearmbs.signals.signal.labels import SPEED_COLUMN, key_of, may_be_slow, may_be_times
 from gearmbs.signals.signal.record import REMEDY, checked_gaps, mean_rate, same_rate, same_start
 from gearmbs.signals.signal.times import in_seconds
 from gearmbs.signals.signal.words import words_of
@@ -23,6 +23,11 @@ FEWEST = 2
 SLOW_SAID = "{name} has fewer samples than the {size} of the others ({how}); between them it is interpolated."
 COVERED = 0.5
 """Share of the record over which a slow channel must be known."""
+CONSTANT = 2e-3
+"""Range of a speed, by its mean, within which it is constant where it is known, as far as displays tell."""
+COARSE = 6e-3
+"""s: second difference of a speed by its mean, times the step, from which straight lines between samples are told. The
+angle goes wrong by a twelfth of it times the speed: at 1500 rpm by 0.0125 turns, 0.3 rad of a mesh of 23 teeth."""
 NUMBERS_ROWS = frozenset(("", "index", "idx", "nr", "no", "row", "sample", "unnamed"))
 
 
@@ -215,4 +220,25 @@ def interpolated(
         )
     ends = f"; it is known from {span} only, its ends hold" if held > 2.0 * step else ""
     words = f"{name} has times of its own, {times.size} of them; between them it is interpolated{ends}."
+    if SPEED_COLUMN.search(key_of(name)[0]):
+        words += _of_a_speed(name, times, values, span if ends else None)
     return np.interp(base, times, values), words
+
+
+def _of_a_speed(name: str, times: np.ndarray, values: np.ndarray, span: str | None) -> str:
+    """Return what a speed's own times do to lines that are followed by it; nothing where they do nothing."""
+    mean = float(np.mean(np.abs(values)))
+    if not mean > 0.0:
+        return ""
+    said = []
+    if span is not None and float(np.ptp(values)) > CONSTANT * mean:
+        said.append(f"what is held beyond {span} was not measured")
+    bend = np.abs(np.diff(values, 2)) / mean * (0.5 * (times[2:] - times[:-2]))
+    if bend.max(initial=0.0) > COARSE:
+        said.append(f"samples are up to {np.diff(times).max():.3g} s apart, between which it bends")
+    if not said:
+        return ""
+    return (
+        f" CHECK THE SPEED: of {name!r} {' and '.join(said)}; lines, orders and averages that are followed by it lose "
+        "a part. Cut the record to what is known, or use a tacho."
+    )
