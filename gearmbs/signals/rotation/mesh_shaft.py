@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 
@@ -33,6 +34,9 @@ from gearmbs.signals.signal.signal import make_signal, rate_of, units_of
 OTHER_COMB = 0.03
 """Relative difference of speeds up to which two combs mean one: a little more than `SPEED_TOLERANCE`, within which the
 given one is looked for."""
+SCATTERED, UNSURE = 0.1, 0.2
+"""Radians of the mesh by which edges of a tacho may scatter, half a percent of the line, 4 % of its third harmonic; and
+that may be left of it, 2 % of the line."""
 LEAST_OFF = 0.05
 """The same from which an angle is calibrated: sinc of it is 0.4 % of the line."""
 MEASURED = 5e-3
@@ -72,13 +76,15 @@ def mesh_shaft(
     SignalError
         If nothing is known of the speed and no mesh line stands out.
     """
-    teeth = tuple(counts)
+    teeth, whole = tuple(counts), signal
     found, signal = known_shaft(signal, known)
     if isinstance(found, float):
         notes += getattr(known.speed, "attrs", {}).get("notes", ())
         shaft = _near_speed(signal, teeth, found, notes)
     elif found is not None:
         notes += found.phase.attrs.get("notes", ())
+        if found.tacho and float(found.phase.attrs["scatter"]) * teeth[0] > SCATTERED:
+            found = _of_scattered_edges(whole, signal, teeth[0], known, found, notes)
         shaft = _calibrated(signal, teeth, found, notes) if found.integrated else found
         if found.integrated and _turns(signal, shaft.speed) >= FOLLOWED_TURNS:
             over = _over_angle(signal, shaft, teeth[0])
@@ -99,6 +105,50 @@ def mesh_shaft(
     if shaft.phase.attrs.get("origin") == "line":
         notes += remark_wander(signal, shaft.speed, teeth[0])
     return shaft, signal
+
+
+def _of_scattered_edges(
+    whole: xr.DataArray, signal: xr.DataArray, teeth: int, known: Known, shaft: Shaft, notes: list[str]
+) -> Shaft:
+    """Return the shaft by a tacho's smoothed edges, where the mesh stands out more by these, and say so.
+
+    The mesh line says whether edges scatter or the shaft does: over the right angle it is the larger.
+    """
+    scatter = float(shaft.phase.attrs["scatter"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        other, _ = known_shaft(whole, known, smooth=True)
+    assert isinstance(other, Shaft)
+    if _mesh_power(signal, other, teeth) <= _mesh_power(signal, shaft, teeth):
+        return shaft
+    left = float(other.phase.attrs["scatter"]) * teeth
+    kept = math.exp(-0.5 * left**2)
+    unsure = left > UNSURE
+    notes.append(
+        f"{'CHECK THE SPEED: ' if unsure else ''}The edges of the tacho {known.tacho!r} scatter by "
+        f"{scatter / math.tau * 100:.2g} % of a turn ({math.degrees(scatter * teeth):.0f} deg of the mesh), which is "
+        f"not the speed: the smoothest course through them is taken. What it leaves takes about {100 * (1 - kept):.2g} "
+        "% from the line at the mesh"
+        + (
+            ", more from its harmonics: look at the levels in bands, or take a steeper edge, more pulses a turn, or the "
+            "speed alone (speed=), which the mesh line is then followed by."
+            if unsure
+            else "."
+        )
+    )
+    return other
+
+
+def _mesh_power(signal: xr.DataArray, shaft: Shaft, teeth: int) -> float:
+    """Return the power of the first mesh harmonics over an angle, as a share of each channel's."""
+    times, values = signal["time"].values, signal.values
+    first, last = np.searchsorted(times, shaft.phase["time"].values[[0, -1]])
+    part = values[first : last + 1] - values[first : last + 1].mean(axis=0)
+    angle = shaft.phase.values[: len(part)]
+    part = part[: angle.size]
+    weight = np.hanning(angle.size)[:, None] * part
+    lines = [np.abs(np.exp(-1j * teeth * k * angle) @ weight) ** 2 for k in range(1, HARMONICS + 1)]
+    return float(np.sum(np.sum(lines, axis=0) / np.maximum(np.sum(part**2, axis=0), 1e-300)))
 
 
 def compare_with_mesh(

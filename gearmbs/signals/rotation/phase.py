@@ -17,6 +17,7 @@ import xarray as xr
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import ATTENUATION_DB, BLOCK, apply_zero_phase, kaiser_taps
 from gearmbs.signals.rotation.recurring import doubtful_turns, sudden_jump
+from gearmbs.signals.rotation.tacho_edges import edge_scatter, smoothed_edges, sure_ends
 from gearmbs.signals.rotation.uneven_marks import uneven_faults
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
 from gearmbs.signals.signal.given import speed_curve
@@ -97,6 +98,7 @@ def phase_from_tacho(
     pulses_per_rev: float = 1.0,
     threshold: float | None = None,
     faults: Literal["mend", "refuse", "keep"] = "mend",
+    smooth: bool = False,
     **_data: Unpack[DataKeywords],
 ) -> xr.DataArray:
     """Angle (rad) of the shaft from a tacho channel's rising pulse edges.
@@ -107,7 +109,8 @@ def phase_from_tacho(
 
     Missing and extra pulses, which would put the angle wrong by whole pitches from there on, are told from the
     intervals beside them where the speed is even enough from pulse to pulse (`gearmbs.signals.rotation.phase`), and
-    mended with a warning: an interval of k of its neighbours' counts as k pitches, two that add to one as one.
+    mended with a warning: an interval of k of its neighbours' counts as k pitches, two that add to one as one. At the
+    ends of the record, where one side alone tells, pulses that do not fit are left out with a warning.
 
     Parameters
     ----------
@@ -123,11 +126,15 @@ def phase_from_tacho(
     faults : {"mend", "refuse", "keep"}
         What to do about missing and extra pulses: "keep" counts every pulse as it comes, as of a shaft that does jump
         so, "refuse" raises.
+    smooth : bool
+        Whether to take the smoothest course of the angle that the scatter of the edges allows, instead of one through
+        each edge: of noisy or slow edges, not of a shaft whose speed jumps from turn to turn.
 
     Returns
     -------
     xarray.DataArray
-        Dimension (time,), only the samples between the first and the last pulse; attribute `notes`, where there was
+        Dimension (time,), only the samples between the first and the last pulse; attributes `scatter`, by how much
+        edges scatter about a smooth course of the angle, or what is left of that, in rad, and `notes`, where there was
         something to mend.
 
     Warns
@@ -156,6 +163,13 @@ def phase_from_tacho(
     if notes and faults == "refuse":
         raise SignalError(f"faults: {' '.join(notes)} Mend them with faults='mend', or take them with faults='keep'")
     kept_edges, numbers = mended_count(edges.size, places)
+    if faults != "keep":
+        begin, end = sure_ends(edges[kept_edges], numbers)
+        ends = _ends_said(edges[kept_edges], begin, end)
+        if ends and faults == "refuse":
+            raise SignalError(f"faults: Tacho {name!r}: {ends} Mend with faults='mend', or take it with faults='keep'")
+        notes += [f"Tacho {name!r}: {ends}"] * bool(ends)
+        kept_edges, numbers = kept_edges[begin : kept_edges.size - end], numbers[begin : numbers.size - end]
     if faults != "keep" and pulses_per_rev >= 2 and float(pulses_per_rev).is_integer():
         shifted, unlike, *_ = doubtful_turns(numbers, edges[kept_edges], int(pulses_per_rev))
         if shifted or unlike:
@@ -171,7 +185,12 @@ def phase_from_tacho(
         )
     for note in notes:
         warn(note, UserWarning)
-    edges, angles = edges[kept_edges], 2.0 * np.pi / pulses_per_rev * numbers
+    edges = edges[kept_edges]
+    scatter = edge_scatter(edges, numbers, pulses_per_rev)
+    if smooth and scatter > 0.0:
+        edges, scatter = smoothed_edges(edges, numbers, pulses_per_rev, scatter)
+        numbers = numbers[0] + np.arange(edges.size)
+    angles = 2.0 * np.pi / pulses_per_rev * numbers
     inside = (times >= edges[0]) & (times <= edges[-1])
     phase = scipy.interpolate.CubicSpline(edges, angles)(times[inside])
     if np.any(np.diff(phase) <= 0.0):
@@ -180,9 +199,22 @@ def phase_from_tacho(
 
         phase = monotone_cubic(edges, angles, times[inside])
     result = _phase(times[inside], phase, "tacho")
+    result.attrs["scatter"] = scatter
     if notes:
         result.attrs["notes"] = notes
     return result
+
+
+def _ends_said(edges: np.ndarray, begin: int, end: int) -> str:
+    """Say which pulses at the ends of a record are left out; empty if none is."""
+    parts = [f"the first {begin} up to {edges[begin - 1]:.6g} s"] * bool(begin)
+    parts += [f"the last {end} from {edges[-end]:.6g} s on"] * bool(end)
+    if not parts:
+        return ""
+    return (
+        f"{' and '.join(parts)} of its pulses come in intervals unlike those beside them, as where one is missing or "
+        "too many at the end of a record; they are left out, and the record ends there."
+    )
 
 
 def pulse_edges(
@@ -211,7 +243,7 @@ def pulse_edges(
     kept: list[int] = []
     previous = 0
     for index in crossings.tolist():
-        if not kept or pulses[previous : index + 1].min() < floor:
+        if pulses[previous : index + 1].min() < floor:
             kept.append(index)
             previous = index + 1
     at = np.asarray(kept, dtype=int)

@@ -32,6 +32,7 @@ def shaft_phase(
     pulses_per_rev: float = 1.0,
     speed_channel: str | None = None,
     needed_for: str = "order tracking",
+    smooth: bool = False,
 ) -> xr.DataArray:
     """Angle of the shaft over time, from the one thing that is known of it.
 
@@ -49,6 +50,8 @@ def shaft_phase(
         Channel that holds the speed, in its own unit (rpm, Hz, rad/s).
     needed_for : str
         Completes the message where nothing is known.
+    smooth : bool
+        Whether edges of the tacho scatter, and the smoothest course through them is wanted (`phase_from_tacho`).
 
     Returns
     -------
@@ -72,7 +75,7 @@ def shaft_phase(
     if phase is not None:
         return _given_angle(phase)
     if tacho is not None:
-        return phase_from_tacho(signal, tacho, pulses_per_rev=pulses_per_rev)
+        return phase_from_tacho(signal, tacho, pulses_per_rev=pulses_per_rev, smooth=smooth)
     if speed_channel is not None:
         return phase_from_speed(signal, speed_of_channel(signal, speed_channel))
     if speed is None:
@@ -199,8 +202,12 @@ class Known(NamedTuple):
     speed_range: tuple[float, float] | None = None
 
 
-def known_shaft(signal: xr.DataArray, known: Known) -> tuple[Shaft | float | None, xr.DataArray]:
+def known_shaft(
+    signal: xr.DataArray, known: Known, *, smooth: bool = False
+) -> tuple[Shaft | float | None, xr.DataArray]:
     """The shaft where its angle is known, or a constant speed in rad/s, or None; and the channels left to analyse.
+
+    Edges of a tacho are smoothed on request.
 
     Raises
     ------
@@ -219,6 +226,7 @@ def known_shaft(signal: xr.DataArray, known: Known) -> tuple[Shaft | float | Non
             tacho=known.tacho,
             pulses_per_rev=known.pulses_per_rev,
             speed_channel=known.speed_channel,
+            smooth=smooth,
         )
     except MissingMetadataError:
         return None, signal
