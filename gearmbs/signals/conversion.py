@@ -120,7 +120,7 @@ def convert(
         lost_below=lost,
     )
     told = [
-        f"{name}: below {low:g} Hz, where {100 * share:.2g} % of its RMS in {unit} lay, nothing is left of the {to}."
+        f"{name}: below {low:g} Hz, where {100 * share:.3g} % of its RMS in {unit} lay, nothing is left of the {to}."
         for name, share, unit in zip(signal["channel"].values, lost, units_of(signal))
         if share >= TOLD_LOSS
     ]

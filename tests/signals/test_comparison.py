@@ -15,6 +15,7 @@ from gearmbs.signals import (
     remove_mean,
     write_signal,
 )
+from gearmbs.signals.analysis.comparison_report import state_meant
 from tests.says import says
 
 RATE, GMF, TEETH = 12800.0, 480.0, 29
@@ -240,3 +241,46 @@ def test_records_of_other_speeds_are_told(faster, told):
     )
     notes = compare({"healthy": tone(BASE["healthy"]), "worn": worn}).notes
     assert any(note.startswith("CHECK THE SPEED: worn at load all") for note in notes) == told
+
+
+def motion(amplitudes, seed=0, seconds=1.2, rate=6400.0, names=("x",)):
+    """Displacements of some channels with noise: mesh lines in the first one only."""
+    t = np.arange(round(seconds * rate)) / rate
+    rng = np.random.default_rng(seed)
+    noise = 0.02 * rng.standard_normal((t.size, len(names)))
+    noise[:, 0] += sum(a * np.cos(2 * np.pi * k * GMF * t + k) for k, a in enumerate(amplitudes, 1))
+    return make_signal(1e-6 * noise, rate, channels=names, units="m", speed=OMEGA, teeth=TEETH)
+
+
+def test_harmonics_beyond_the_band_of_a_conversion_are_left_out_by_name():
+    """What would be told of them is the noise that its taper leaves: twice the mesh at 960 Hz rises by 9.5 dB."""
+    states = {"healthy": motion((1.0, 0.5)), "misaligned": motion((1.0, 1.5), seed=1)}
+    report = compare({"low": states}, quantity="acceleration", band=("100 Hz", "700 Hz"), harmonics=2)
+    assert report.data["harmonic"].values.tolist() == [1]
+    assert any("2 x GMF (960 Hz)" in note for note in report.notes)
+    assert not any("not as expected" in line for line in report.summary())
+    assert any("misaligned" in line and "cannot be told" in line for line in report.summary())
+    wide = compare({"low": states}, quantity="acceleration", band=("100 Hz", "1.2 kHz"), harmonics=2)
+    assert float(wide.changes().sel(load="low", harmonic=2).squeeze()) == pytest.approx(9.54, abs=0.5)
+    with pytest.raises(SignalError, match=says("band", "1 x GMF", "700", "--band")):
+        compare({"low": states}, quantity="acceleration", band=("600 Hz", "700 Hz"), harmonics=2)
+
+
+def test_channels_without_a_mesh_line_do_not_count():
+    """Across the motion a camera has the noise of its tracking, which neither rises nor falls."""
+    states = {
+        "healthy": motion((1.0, 0.5, 0.2), names=("x", "y")),
+        "wider": motion((2.0, 1.0, 0.4), 1, names=("x", "y")),
+    }
+    report = compare({"low": states})
+    assert report.data.attrs["silent"] == ["y"]
+    assert any("'y'" in note and "does not count" in note for note in report.notes)
+    assert any("3 of 3 values do: as expected" in line for line in report.summary())
+    none = compare({"low": {state: one.sel(channel=["y"]) for state, one in states.items()}})
+    assert any(note.startswith("CHECK THE SPEED") for note in none.notes)
+
+
+@pytest.mark.parametrize("name", ["wider", "Widened", "centre distance", "+3 mm distance", "distance"])
+def test_states_are_known_by_what_they_are_called(name):
+    assert state_meant(name) == "distance"
+    assert state_meant("worn") is state_meant("healthy") is None

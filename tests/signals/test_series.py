@@ -47,7 +47,7 @@ def test_a_folder_becomes_one_table_in_the_order_of_its_numbers(folder):
     assert table.columns[table.isna().any()].tolist() == ["acc.velocity_rms"]
     assert table["notes"].str.contains("velocity_rms: signal: 0.5 s are too short").all()
     one = analyse(folder / "snap_3.csv", speed="1500 rpm").to_frame()
-    pd.testing.assert_frame_equal(table.iloc[[3]].drop(columns="file").reset_index(drop=True), one)
+    pd.testing.assert_frame_equal(table.iloc[[3]].drop(columns=["file", "units"]).reset_index(drop=True), one)
     assert series(str(folder / "snap_1*.csv"))["file"].tolist() == ["snap_1.csv", "snap_10.csv", "snap_11.csv"]
 
 
@@ -190,3 +190,21 @@ def test_wrong_calls(files, settings, said):
         series(files, **settings)
     with pytest.raises(TypeError):
         series(files if files == "none.csv" else "none.csv", no_such=1)
+
+
+def test_files_of_other_units_are_converted_to_those_of_the_first(tmp_path):
+    """A logger that was changed within a run to failure: the same vibration in m/s^2 is 9.8 times as much."""
+    one = snapshot(3)
+    write_signal(one, tmp_path / "s0.csv")
+    write_signal(make_signal({"acc": 9.80665 * one.values[:, 0]}, RATE, units="m/s^2"), tmp_path / "s1.csv")
+    write_signal(make_signal({"acc": one.values[:, 0]}, RATE, units="mm/s"), tmp_path / "s2.csv")
+    table = series(tmp_path, store=tmp_path / "out" / "table.csv")
+    assert table["units"].tolist() == ["g", "g", "mm/s"]
+    for level in ("acc.rms", "acc.peak"):
+        assert table[level][1] == pytest.approx(table[level][0], rel=1e-9)
+    assert "converted to g" in table["notes"][1]
+    assert "CHECK THE UNITS" in table["notes"][2]
+    # those of the first file are in the journal
+    write_signal(make_signal({"acc": 9.80665 * one.values[:, 0]}, RATE, units="m/s^2"), tmp_path / "s3.csv")
+    again = series(tmp_path, store=tmp_path / "out" / "table.csv")
+    assert again["acc.rms"][3] == pytest.approx(table["acc.rms"][0], rel=1e-9)

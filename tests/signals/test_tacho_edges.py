@@ -64,7 +64,7 @@ def test_where_more_than_scatter_moves_the_speed_the_loss_is_told():
 
 
 def test_a_shaft_whose_speed_does_change_from_turn_to_turn_is_followed():
-    """Two turns longer, two shorter, again and again: the mesh line, 0.7 rad to and fro, says that the shaft does so."""
+    """Two turns longer, two shorter, again and again: the mesh, 0.7 rad to and fro, says that the shaft does so."""
     turns = STEADY + 0.015 / np.pi * np.sin(TURN * 0.25 * STEADY + 0.25 * np.pi)
     lines, _, notes = analysed(turns, np.cos(TURN * turns))
     assert lines == pytest.approx(LINES, rel=0.03)
@@ -72,7 +72,7 @@ def test_a_shaft_whose_speed_does_change_from_turn_to_turn_is_followed():
 
 
 def test_edges_that_do_not_scatter_are_taken_as_they_are():
-    lines, speed, notes = analysed(SWAYING, np.cos(TURN * SWAYING))
+    lines, _, notes = analysed(SWAYING, np.cos(TURN * SWAYING))
     assert lines == pytest.approx(LINES, rel=0.01)
     assert "scatter" not in notes
 

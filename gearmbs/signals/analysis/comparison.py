@@ -159,17 +159,67 @@ def compare(
                     f"{state} at load {load}: {note}" for note in sorted(told, key=lambda n: not n.startswith(LOUD))
                 ]
     notes = _other_speeds(found["experiment"], reference) + notes
+    edges = None if band is None else (to_si(band[0], "frequency", "band"), to_si(band[1], "frequency", "band"))
+    inside, said = _inside(found["experiment"], edges)
+    found = {side: {at: one.sel(harmonic=inside) for at, one in cases.items()} for side, cases in found.items()}
     data = _tabulate(found["experiment"], loads, states, "experiment")
+    silent = [str(c) for c, stands in zip(data["channel"].values, _stand(data)) if not stands]
+    notes = [*said, *_silence_told(silent, data.sizes["channel"]), *notes]
     if model is not None:
         data = _with_model(data, _tabulate(found["model"], loads, states, "model"), reference, scope)
     data = data.rename(rms="experiment")
     data.attrs.update(reference=reference, scope=scope, way=way, half_width=half_width)
+    data.attrs["silent"] = silent if len(silent) < len(data.get("channel", ())) else []
     return ComparisonReport(data, reference, left_out, notes)
 
 
 SAME_SPEED = 0.05
 """Share by which the mesh frequencies of records of one load may differ: speeds of drives change by 3 % at most with
 their load, and a level that grows as the square of the speed by 1 dB, from which it counts as a change, at 6 %."""
+
+
+STANDS = 3.0
+"""Times as high as those beside it from which a mesh line is there: of chance one in 8000 is."""
+
+
+def _stand(data: xr.Dataset) -> np.ndarray:
+    """Return of which channels a mesh line stands out of the orders beside it in any record, or nothing is known."""
+    over = data["over_floor"]
+    highest = over.max([dim for dim in over.dims if dim != "channel"]).values
+    return ~(highest < STANDS)
+
+
+def _silence_told(silent: Sequence[str], count: int) -> list[str]:
+    """Say which channels show no mesh line."""
+    if not silent:
+        return []
+    names = ", ".join(map(repr, silent))
+    if len(silent) == count:
+        return [
+            f"CHECK THE SPEED: no mesh line stands out of what is beside it, on none of {names}: what changes there is "
+            "noise, or something else."
+        ]
+    return [f"{names}: no mesh line stands out of what is beside it in any record; what changes there does not count."]
+
+
+def _inside(
+    found: Mapping[tuple[str, str], xr.Dataset], band: tuple[float, float] | None
+) -> tuple[list[int], list[str]]:
+    """Return the harmonics within the band (Hz) of a conversion, in all records, and what is said of the others."""
+    numbers = [int(k) for k in next(iter(found.values()))["harmonic"].values]
+    if band is None:
+        return numbers, []
+    gmf = [float(one["gmf"]) for one in found.values()]
+    inside = [k for k in numbers if k * min(gmf) >= band[0] and k * max(gmf) <= band[1]]
+    gone = ", ".join(f"{k} x GMF ({k * max(gmf):.4g} Hz)" for k in numbers if k not in inside)
+    if not inside:
+        raise SignalError(
+            f"band: {gone} {'lie' if len(numbers) > 1 else 'lies'} outside {band[0]:g} to {band[1]:g} Hz, beyond which "
+            "the conversion leaves nothing; give a band that holds the harmonics (--band)"
+        )
+    if not gone:
+        return numbers, []
+    return inside, [f"{gone}: left out, as beyond the band of {band[0]:g} to {band[1]:g} Hz nothing is left of them."]
 
 
 def _other_speeds(found: Mapping[tuple[str, str], xr.Dataset], reference: str) -> list[str]:
@@ -321,10 +371,14 @@ def _features(
         )
     data = xr.Dataset({"rms": report.harmonics[way].drop_vars(["frequency", "channel_units"])})
     floor = None if report.average is None else turn_floor(report.average, _teeth(signal, wheel), harmonics)
+    dims = ("harmonic", "channel")
+    unknown = np.full((harmonics, signal.sizes["channel"]), np.nan)
     for name, end in (("least", "low"), ("most", "high")):
         # of the line alone; what is in the band beside it moves as it does
-        share = np.full(data["rms"].shape, np.nan) if floor is None else (floor[end] / floor["rms"]).T
-        data[name] = data["rms"].copy(data=data["rms"].values * share.reshape(data["rms"].shape))
+        share = unknown if floor is None else floor[end] / floor["rms"]
+        data[name] = data["rms"] * xr.DataArray(share, dims=dims)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        data["over_floor"] = (dims, unknown if floor is None else floor["rms"] / floor["floor"])
     data["level"] = report.levels["rms"]
     data["gmf"] = report.gmf
     for name in FEATURES:

@@ -24,6 +24,8 @@ from gearmbs.signals.analysis.sections import ReadingKeywords, sections
 from gearmbs.signals.errors import SignalError, SignalFileError
 from gearmbs.signals.files.simulated import read_any
 from gearmbs.signals.files.table import known_endings
+from gearmbs.signals.signal.signal import UNKNOWN_UNITS, like, units_of
+from gearmbs.signals.signal.units import unit_dimension
 from gearmbs.system import rename_over
 from gearmbs.wording import warn
 
@@ -80,7 +82,8 @@ def series(
     Returns
     -------
     DataFrame
-        `file`, `label` if there are labels, `start_s` of sections, then as `features`.
+        `file`, `label` if there are labels, `start_s` of sections, then as `features`, and `units`: those of the first
+        file, into which the others are converted with a remark. Where that cannot be, a remark says CHECK THE UNITS.
 
     Raises
     ------
@@ -97,18 +100,20 @@ def series(
         journal = Journal(Path(store), _digest({"teeth": teeth, "section": section, "by": by, **settings}))
     rows: list[dict[str, Any]] = []
     first: list[str] = []
+    wanted: dict[str, str] = {}
     name = "series"
     own = progress if callable(progress) else None
     with bars(None if own is not None else progress, [name]) as move:  # type: ignore[arg-type]
         for i, path in enumerate(paths):
             kept = None if journal is None else journal.rows_of(path)
             if kept is None:
-                kept = _rows(path, teeth, section, by, errors, settings)
+                kept = _rows(path, teeth, section, by, errors, settings, wanted)
                 if journal is not None:
                     journal.add(path, kept)
+            wanted = wanted or next((row["units"] for row in kept if isinstance(row.get("units"), dict)), {})
             head: dict[str, Any] = {"file": path.name} | ({} if labels is None else {"label": labels[i]})
             first = first or _channels(kept)
-            rows += [{**head, **_renamed(row, first)} for row in kept]
+            rows += [{**head, **_with_units(_renamed(row, first))} for row in kept]
             if own is not None:
                 own(path.name, (i + 1) / len(paths))
             elif move is not None:
@@ -238,8 +243,61 @@ def _key(path: Path) -> str:
     return f"{path.resolve()}|{about.st_size}|{about.st_mtime_ns}"
 
 
+def _with_units(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row with the units of its channels in words."""
+    units = row.get("units")
+    if not isinstance(units, dict):
+        return row
+    if "channel" in row:
+        return {**row, "units": units.get(row["channel"], UNKNOWN_UNITS)}
+    alike = len(set(units.values())) == 1
+    return {**row, "units": next(iter(units.values())) if alike else "; ".join(f"{n}: {u}" for n, u in units.items())}
+
+
+def _in_units(signal: xr.DataArray, wanted: Mapping[str, str]) -> xr.DataArray:
+    """Return a signal in the units of the first file, as far as they are known and of one kind, and say so."""
+    names, units = [str(c) for c in signal["channel"].values], units_of(signal)
+    if not wanted:
+        return signal
+    by_place = len(wanted) == len(names) and not set(wanted) & set(names)
+    told = list(wanted.values()) if by_place else [wanted.get(name) for name in names]
+    factors, new, notes = np.ones(len(names)), list(units), []
+    for i, (name, unit, first) in enumerate(zip(names, units, told)):
+        if first is None or unit == first:
+            continue
+        kinds = []
+        for one in (unit, first):
+            try:
+                kinds.append(unit_dimension(one))
+            except SignalError:
+                kinds.append(("", 1.0))
+        (kind, factor), (other, reference) = kinds
+        if kind and kind == other:
+            factors[i], new[i] = factor / reference, first
+            notes.append(f"{name!r} is in {unit} here, and converted to {first}, the unit of the first file.")
+        else:
+            notes.append(f"CHECK THE UNITS: {name!r} is in {unit} here, in {first} in the first file.")
+    if not notes:
+        return signal
+    kept = signal if new == units else like(signal, signal.values * factors, units=new)
+    return kept.assign_attrs(notes=[*signal.attrs.get("notes", ()), *notes])
+
+
+def _units_told(signal: xr.DataArray, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows with the units of the channels that they speak of."""
+    known = dict(zip(map(str, signal["channel"].values), units_of(signal)))
+    units = {name: known[name] for name in _channels(rows) if name in known}
+    return [row | ({"units": units} if units else {}) for row in rows]
+
+
 def _rows(
-    path: Path, teeth: Any, section: float | str | None, by: By, errors: str, settings: Mapping[str, Any]
+    path: Path,
+    teeth: Any,
+    section: float | str | None,
+    by: By,
+    errors: str,
+    settings: Mapping[str, Any],
+    wanted: Mapping[str, str],
 ) -> list[dict[str, Any]]:
     """Rows of plain values of one file, one row with the reason if it cannot be analysed."""
     reading = {key: settings[key] for key in READING if settings.get(key) is not None}
@@ -251,11 +309,14 @@ def _rows(
         reading["channels"] = list(dict.fromkeys([*reading["channels"], *helpers]))
     try:
         if section is None:
-            return feature_rows(analyse(read_any(path, **reading), teeth, **asked, **analysing), by)
+            signal = _in_units(read_any(path, **reading), wanted)
+            return _units_told(signal, feature_rows(analyse(signal, teeth, **asked, **analysing), by))
         rows = []
-        for part in sections(path, section, **reading):
+        for whole in sections(path, section, **reading):
+            part = _in_units(whole, wanted)
             start = float(part["time"].values[0])
-            rows += [{"start_s": start, **row} for row in _part_rows(part, teeth, by, errors, asked | analysing)]
+            found = _part_rows(part, teeth, by, errors, asked | analysing)
+            rows += [{"start_s": start, **row} for row in _units_told(part, found)]
         return rows
     except SignalError as error:
         if errors == "raise":

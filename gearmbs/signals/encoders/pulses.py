@@ -30,6 +30,10 @@ OVERFLOW = 0.5
 """Share of the span of times by which each fall is more than disorder: a counter falls by nearly all of it."""
 FEWEST_GAPS, ALIKE = 3, 0.8
 """Distances of missing pulses, and the share of them that is the same, from which these are no chance."""
+FEWEST_EVEN = 8
+"""Marks of a disc from which an interval of a whole number of the others is a gap: few marks are set as one likes."""
+GAP, OTHERS = 0.15, 0.25
+"""Pitches by which a gap may be off a whole number of the others, and each of these off their median."""
 INDEX_REACH = 1.0
 """Pitches within which a pulse must follow an index pulse to be that of mark 0."""
 
@@ -194,6 +198,8 @@ def pulse_train(
     if words and faults == "refuse":
         raise SignalError(f"faults: {' '.join(words)} Mend them with faults='mend', or take them with faults='keep'")
     train = PulseTrain(at[kept], counted.astype(np.int64), int(lines), name=name)
+    if faults != "keep":
+        _check_gaps(train)
     train, words = _referenced(train, once, lost + words, by_turns is not None)
     if by_turns is None and faults != "keep":
         words = [*words, *_doubts(train, found)]
@@ -330,6 +336,42 @@ def _check_recurrence(missing: np.ndarray, train: PulseTrain) -> None:
         raise SignalError(
             f"lines: a pulse of {train.name!r} is missing every {every}, as of a disc of {every} lines that lacks one, "
             f"not of {train.lines}; give lines={every}, or take the pulses as they are with faults='keep'"
+        )
+
+
+def _check_gaps(train: PulseTrain) -> None:
+    """Refuse the count of the marks that a disc with gaps has, told as that of its pitches.
+
+    Whoever counts the teeth of a trigger wheel with gaps counts those that are there.
+    """
+    lines, numbers, apart = train.lines, train.numbers, np.diff(train.numbers)
+    if lines < FEWEST_EVEN or train.turns < FEWEST_GAPS:
+        return
+    mark, steps = numbers[:-1] % lines, np.diff(train.times)
+    # each by the turn about it, so that the speed drops out
+    turn = np.interp(numbers + 0.5 * lines, numbers, train.times) - np.interp(
+        numbers - 0.5 * lines, numbers, train.times
+    )
+    inside = (apart == 1) & (numbers[:-1] - numbers[0] >= lines) & (numbers[-1] - numbers[:-1] >= lines)
+    relative = steps[inside] / turn[:-1][inside]
+    pitches = np.array([np.median(relative[mark[inside] == m]) for m in np.unique(mark[inside])])
+    if not pitches.size:
+        return
+    pitches = pitches / np.median(pitches)
+    wide = pitches > 1.5
+    whole = np.rint(pitches[wide])
+    if (
+        wide.any()
+        and wide.mean() < 0.25
+        and np.abs(pitches[wide] - whole).max() <= GAP
+        and np.abs(pitches[~wide] - 1.0).max() <= OTHERS
+    ):
+        lacks = int(np.sum(whole - 1.0))
+        raise SignalError(
+            f"lines: in each turn of {train.name!r} {int(wide.sum())} of {lines} intervals "
+            f"{'is' if wide.sum() == 1 else 'are'} {', '.join(f'{n:.3g}' for n in pitches[wide])} times as long as the "
+            f"others, as of a disc of {lines + lacks} lines that lacks {lacks}; give lines={lines + lacks}, those that "
+            "are missing included, or take the pulses as they are with faults='keep'"
         )
 
 

@@ -130,8 +130,8 @@ def _of_scattered_edges(
         f"not the speed: the smoothest course through them is taken. What it leaves takes about {100 * (1 - kept):.2g} "
         "% from the line at the mesh"
         + (
-            ", more from its harmonics: look at the levels in bands, or take a steeper edge, more pulses a turn, or the "
-            "speed alone (speed=), which the mesh line is then followed by."
+            ", more from its harmonics: look at the levels in bands, or take a steeper edge, more pulses a turn, or "
+            "the speed alone (speed=), near which the mesh line is then followed."
             if unsure
             else "."
         )

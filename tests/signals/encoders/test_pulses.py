@@ -80,6 +80,25 @@ def test_a_mark_that_the_disc_lacks_numbers_the_others():
     assert "lacks 1 of 60" in lacking.notes[0]
 
 
+@pytest.mark.parametrize(("whole", "lacking"), [(60, [10, 11]), (60, [59]), (36, [7, 8, 25, 26])])
+def test_the_teeth_of_a_trigger_wheel_with_gaps_are_no_lines(whole, lacking):
+    """Whoever counts them counts 58 of a wheel of 60-2: a gap of three pitches would be 3.8 deg at order 1."""
+    train = encoder(steady(12.0), whole, lacking=lacking)
+    counted = whole - len(lacking)
+    with pytest.raises(SignalError, match=says("lines", str(counted), f"lines={whole}", "keep")):
+        pulse_train(train.times, counted)
+    assert pulse_train(train.times, counted, faults="keep").lines == counted
+    assert pulse_train(train.times, whole).lines == whole
+
+
+def test_wide_marks_of_no_whole_number_of_pitches_are_the_disc_s_own():
+    """Marks of 2.5 pitches, as of a joint, and discs of few marks are taken as they are told."""
+    wide = np.concatenate((np.arange(40.0), [41.5]))
+    for places in (wide / 43.0, np.array([0.0, 1.0, 3.0]) / 4.0):
+        turns = (np.arange(12)[:, None] + places).ravel()
+        assert not pulse_train(0.04 * turns, places.size).notes
+
+
 def test_uneven_reflectors_are_taken_as_they_are():
     uneven = np.array([0.0, 0.25, -0.1, 0.3])
     train = encoder(steady(40.0), 4, marks=uneven, index=True)
