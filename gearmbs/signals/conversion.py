@@ -120,11 +120,16 @@ def convert(
         lost_below=lost,
     )
     told = [
-        f"{name}: below {low:g} Hz, where {100 * share:.3g} % of its RMS in {unit} lay, nothing is left of the {to}."
+        f"{name}: below {low:g} Hz, where {_percent(share)} % of its RMS in {unit} lay, nothing is left of the {to}."
         for name, share, unit in zip(signal["channel"].values, lost, units_of(signal))
         if share >= TOLD_LOSS
     ]
     return result.assign_attrs(notes=[*signal.attrs.get("notes", ()), *told]) if told else result
+
+
+def _percent(share: float) -> str:
+    """Return a share in percent with two digits, three of nearly all of it."""
+    return f"{100.0 * share:.{3 if share >= 0.995 else 2}g}"
 
 
 def rms_within(column: np.ndarray, rate: float, band: tuple[float, float]) -> float:

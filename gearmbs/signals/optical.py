@@ -22,6 +22,7 @@ from gearmbs.progress import waiting
 from gearmbs.signals.encoders.estimate import amplitude_interval
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.signal.arguments import DataKeywords, takes_data
+from gearmbs.signals.signal.shapes import alone_far_off
 from gearmbs.signals.signal.signal import like, rate_of, units_of
 from gearmbs.signals.signal.units import DIMENSIONS, unit_dimension
 from gearmbs.units import Quantity, to_si
@@ -71,6 +72,8 @@ ISLAND = 3
 follows it."""
 AT_RANGE = 0.98
 """Share of the range from which a sample is over it."""
+FAR_BELOW = 0.5
+"""Part of the range below which all else stays where a record shows its range in drop-outs alone."""
 REGULARISED = 1e-9
 """White noise by the record's power with which prediction is learnt: a pure tone would leave it open."""
 BESIDE = 2
@@ -98,7 +101,8 @@ def repair_vibrometer(
         Dimensions (time, channel), or whatever `to_signal` makes a signal of, with ``rate``, ``units``,
         ``channels`` and ``gaps`` as there.
     full_scale : float or str, optional
-        Range of the instrument, in the signal's unit or with one: samples at it are lost.
+        Range of the instrument, in the signal's unit or with one: samples at it are lost. Default: the value at which a
+        record stands as no vibration does, where all else stays below half of it and spikes are looked for.
     level : str, optional
         Channel with the strength of the light, which is left out of the result; samples at which it is below
         `least_level`, by default a fifth of its median, are lost.
@@ -169,6 +173,8 @@ def _lost(
     column: np.ndarray, dark: np.ndarray, bound: float | None, spikes: float | None
 ) -> tuple[np.ndarray, dict[str, np.ndarray], list[_Recurring]]:
     """Return which samples of a channel are lost with their neighbours, which were found by what, and what recurs."""
+    if bound is None and spikes is not None:
+        bound = _shown_range(column)
     found = {
         "dark": dark,
         "over the range": np.zeros_like(dark) if bound is None else np.abs(column) >= AT_RANGE * bound,
@@ -194,6 +200,21 @@ def _lost(
     return lost, found, again
 
 
+def _shown_range(column: np.ndarray) -> float | None:
+    """Return the range that a record stands at in drop-outs, where these are far off all else, or None.
+
+    A vibration that exceeds the range comes near it from below.
+    """
+    top = flat_top(column)
+    if top is None:
+        return None
+    at = np.abs(column) >= AT_RANGE * abs(top[0])
+    middle = float(np.median(column[~at])) if not at.all() else 0.0
+    rest = np.abs(column[~_widened(at)] - middle)
+    far = rest.size > 0 and float(rest.max()) < FAR_BELOW * abs(top[0] - middle) and at.mean() <= MOST_LOST
+    return abs(top[0]) if far else None
+
+
 class _Recurring(NamedTuple):
     """Spikes that recur: how many, after how many samples, and how high."""
 
@@ -206,7 +227,8 @@ def _recurring(column: np.ndarray, spikes: np.ndarray, lost: np.ndarray) -> tupl
     """Return families of spikes that recur, as blows do and light that fails by chance does not, and their samples."""
     families: list[_Recurring] = []
     spared = np.zeros_like(spikes)
-    places = _stretches(spikes)
+    # pieces of one drop-out are no family
+    places = _stretches(_widened(spikes))
     if len(places) < FEWEST_BLOWS:
         return families, spared
     off = column - _bridged(column, lost)
@@ -275,13 +297,24 @@ def instrument_faults(signal: xr.DataArray, beside: Sequence[str] = ()) -> list[
     for name, unit, column in zip(signal["channel"].values, units_of(signal), signal.values.T, strict=True):
         if str(name) in beside:
             continue
-        if (top := flat_top(column)) is not None and top[0] != 0.0:
+        if (odd := alone_far_off(column)) is not None:
+            at, count, times = odd
+            remarks.append(
+                f"CHECK THE RECORD: {name} is {column[at]:g} {unit} at {float(signal['time'].values[at]):.6g} s "
+                f"(sample {at + 1}), {times:.2g} times as far from the rest as that scatters"
+                + (f", and {count - 1} more are so" if count > 1 else "")
+                + ", as where a logger writes a value for one that is missing: its levels are wrong by it. Leave it "
+                "empty in the file and pass gaps='interpolate' (--gaps interpolate)."
+            )
+        fast = _known_unit(unit) and unit_dimension(unit)[0] == "velocity"
+        drops = fast and not seen and _shown_range(column) is not None
+        if not drops and (top := flat_top(column)) is not None and top[0] != 0.0:
             limit, count = top
             remarks.append(
                 f"CLIPPED: {name} stands at {limit:.6g} {unit} in {count} samples, as where a range is exceeded: its "
                 "levels are wrong, and its harmonics not only its own. Measure with a larger range."
             )
-        if seen or not _known_unit(unit) or unit_dimension(unit)[0] != "velocity" or np.ptp(column) == 0.0:
+        if seen or not fast or np.ptp(column) == 0.0:
             continue
         lost, found, again = _lost(column, np.zeros(column.size, dtype=bool), None, SPIKE)
         remarks += [_recurring_said(name, one, rate_of(signal)) for one in again]

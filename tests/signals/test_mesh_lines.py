@@ -104,6 +104,20 @@ def test_one_line_alone_is_doubted():
     assert not any("CHECK" in note for note in analyse(signal, 20, speed="2400 rpm").notes)
 
 
+@pytest.mark.parametrize("rate", [2560.0, 4000.0])
+@pytest.mark.parametrize("sway", [0.0, 2.0])
+def test_one_line_alone_is_the_first_harmonic_whatever_the_rate(rate, sway):
+    """At 2560 Hz its double would lie beyond half the rate, and it had been taken for the double of half of it."""
+    t = np.arange(round(4 * rate)) / rate
+    x = 3.0 * np.cos(math.tau * 725.0 * t + sway * np.sin(math.tau * 0.3 * t))
+    signal = make_signal(x + 0.3 * np.random.default_rng(1).standard_normal(t.size), rate)
+    found = followed_comb(signal, 29, None)
+    assert found.gmf == pytest.approx(725.0, rel=1e-3)
+    assert "one line alone" in found.doubt
+    beside = make_signal(signal.values[:, 0] + np.cos(math.tau * 362.5 * t), rate)
+    assert followed_comb(beside, 29, None).gmf == pytest.approx(362.5, rel=1e-3)
+
+
 @pytest.mark.parametrize("teeth", [29, 43])
 @pytest.mark.parametrize("off", [0.0, -0.015, 0.03, -0.03])
 def test_a_sideband_within_the_tolerance_is_no_mesh_line(teeth, off):

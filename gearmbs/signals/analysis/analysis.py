@@ -302,7 +302,7 @@ def _report(signal: xr.DataArray, counts: tuple[int, ...], options: AnalysisOpti
     gmf = counts[0] * shaft.speed / (2.0 * math.pi)
     rate = rate_of(signal)
     top = gmf if shaft.range is None else gmf * shaft.range[1] / shaft.speed
-    harmonics = _fitting_harmonics(rate, top, options, notes)
+    harmonics = _fitting_harmonics(rate, top, options, notes, shaft)
     tell("averaging")
     own, phase = counts[options.wheel - 1], shaft.phase
     if options.wheel > 1:
@@ -378,13 +378,19 @@ def _in_angle(signal: xr.DataArray, shaft: Shaft, teeth: int, harmonics: int, no
     )
 
 
-def _fitting_harmonics(rate: float, gmf: float, options: AnalysisOptions, notes: list[str]) -> int:
+def _fitting_harmonics(rate: float, gmf: float, options: AnalysisOptions, notes: list[str], shaft: Shaft) -> int:
     """Return how many of the harmonics wanted have their bands below half the sampling rate."""
     check_harmonics(options.harmonics)
     fitting = math.floor((rate / 2 / gmf - options.half_width - TRANSITION) * (1 - 1e-9))
     if fitting < 1:
+        pulses = options.pulses_per_rev
+        each = f"{pulses:g} pulse{'s' * (pulses != 1)} a turn"
+        tacho = (
+            f"; the tacho {options.tacho!r} gives {shaft.speed * 30.0 / math.pi:.0f} rpm with {each}: if it has more, "
+            "say how many with pulses_per_rev=... (--pulses)"
+        ) * shaft.tacho
         raise SignalError(
-            f"gmf: the band around {gmf:g} Hz does not fit below half the sampling rate ({rate / 2:g} Hz)"
+            f"gmf: the band around {gmf:g} Hz does not fit below half the sampling rate ({rate / 2:g} Hz){tacho}"
         )
     if fitting < options.harmonics:
         notes.append(f"Only {fitting} of {options.harmonics} mesh harmonics fit below half the sampling rate.")

@@ -342,10 +342,12 @@ def _speed(signal: xr.DataArray, found: Shaft | float | None, notes: list[str]) 
     lines = f"the line at order {orders[0]}" if len(orders) == 1 else f"lines at orders {', '.join(map(str, orders))}"
     if abs(refined / found - 1.0) > SPEED_DIFFERS:
         said = "says" if len(orders) == 1 else "say"
+        alone = " The diagnosis of bearings takes a speed from a family of orders only."
         notes.append(
             f"{lines[0].upper()}{lines[1:]} {said} {refined * 30.0 / math.pi:.1f} rpm, "
-            f"{found * 30.0 / math.pi:.1f} rpm were given: orders are taken at the former. The diagnosis of bearings "
-            "takes a speed from a family of orders only."
+            f"{found * 30.0 / math.pi:.1f} rpm were given: orders are taken at the former."
+            + alone
+            * (len(orders) < FAMILY)
         )
     return refined, f"from {lines}, {100 * (refined / found - 1):+.3f} % off the given speed"
 

@@ -123,6 +123,7 @@ def _split(text: str | None, option: str) -> list[str] | None:
 
 def _read(path: Path, lines: Any, columns: Any, **known: Any) -> dict[str, PulseTrain]:
     from gearmbs.signals.encoders.files import read_pulses
+    from gearmbs.signals.encoders.result import SHAFTS
 
     counts, names = _split(lines, "--lines"), _split(columns, "--columns")
     try:
@@ -132,9 +133,16 @@ def _read(path: Path, lines: Any, columns: Any, **known: Any) -> dict[str, Pulse
     if whole is not None and names is not None:
         return read_pulses(path, dict(zip(names, whole)), **known)
     if whole is not None:
-        if whole[0] != whole[1]:
-            raise ValueError(f"--lines {lines}: name the columns that have them with --columns driver,driven")
-        return read_pulses(path, whole[0], **known)
+        if whole[0] == whole[1]:
+            return read_pulses(path, whole[0], **known)
+        # the columns of the file, in the order of driver and driven
+        own = list(read_pulses(path, whole[0], faults="keep", **known))
+        own = list(SHAFTS) if set(SHAFTS) <= set(own) else own
+        if len(own) != 2:
+            raise ValueError(
+                f"--lines {lines}: {path} has the columns {own}; say which have them with --columns {','.join(own[:2])}"
+            )
+        return read_pulses(path, dict(zip(own, whole)), **known)
     found = read_pulses(path, **known)
     return found if names is None else {name: found[name] for name in names if name in found}
 

@@ -14,6 +14,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from gearmbs.progress import staged
+from gearmbs.signals.encoders.positions import COUNTS, positions_of, train_of_positions
 from gearmbs.signals.encoders.pulses import PulseTrain, TrainKeywords, pulse_train, pulses_of_channel
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
 from gearmbs.signals.files.formats import checked_format, damage_named, format_to_write, read_signal, write_record
@@ -29,7 +30,6 @@ COUNTER_BITS = (16, 24, 32)
 """Widths of counters, which begin anew after as many bits."""
 LONGEST_FIT = 10.0
 """Usual steps up to which the one across an overflow may be: missing pulses are told and mended later."""
-COUNTS = frozenset({"ticks", "tick", "counts", "count"})
 RISING = 0.9
 """Share of the steps of times and counts that rise, also of a counter that begins anew; of a voltage half do."""
 KNOWN = "encoders"
@@ -91,7 +91,7 @@ def read_pulses(
     progress: Callable[[float, str], None] | None = None,
     **known: Unpack[TrainKeywords],
 ) -> dict[str, PulseTrain]:
-    """Read the pulses of encoders and tachos.
+    """Read the pulses of encoders and tachos, or positions over time, counts or angles, as the times of their marks.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def read_pulses(
     unit : {"s", "ms", "us", "ns"}, optional
         Of times in columns that name none.
     rate : float, optional
-        Sampling rate of sampled voltages, Hz, where the file does not say it.
+        Sampling rate of sampled voltages and positions, Hz, where the file does not say it.
     **known
         Further arguments of `pulse_train`.
 
@@ -137,9 +137,17 @@ def read_pulses(
         raise SignalFileError(path, f"has no column {missing[0]!r}; it holds {record.names}")
     found = {}
     begin = None
+    given = None if rate is None else to_si(rate, "frequency", "rate")
+    own = record.rate if record.rate is not None and record.rate != asked.rate else given
     for name in wanted:
         about = told.get(name, {})
         count = lines[name] if isinstance(lines, Mapping) else lines or about.get("lines")
+        places = positions_of(path, name, _present(table[name]), units[name], own, record.t0, clock is not None)
+        if places is not None and unit is None:
+            found[name] = train_of_positions(
+                places, count, name, {**known, "tooth_at_zero": about.get("tooth_at_zero")}
+            )
+            continue
         if count is None:
             raise MissingMetadataError(
                 "lines", f"the pulses in {path.name}", f"pass lines={{{name!r}: ...}}, the marks of a turn"

@@ -170,6 +170,10 @@ def read_hdf(path: Path, channels: Sequence[str] | None, rate: float | None = No
                     table = arrays.pop(key)
                     columns = table if table.shape[0] == len(names) else table.T
                     homes.update(dict.fromkeys(names, homes[key]))
+                    for attr in [a for a in item.attrs if f"{key}.{a}" in scalars]:
+                        # what a matrix says of its rate is said of each of its columns
+                        told = scalars.pop(f"{key}.{attr}")
+                        scalars.update({f"{n}.{attr}": told for n in names})
                     arrays.update(zip(names, columns, strict=True))
                     units.update(
                         {n: units.get(f"{key}_{i + 1}", units.get(key, UNKNOWN_UNITS)) for i, n in enumerate(names)}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
-from typing import Literal
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal
 
 import pandas as pd
 
@@ -80,6 +80,30 @@ def in_thousands(cells: Iterable[str], decimal: str) -> str | None:
         return None
     told = all(map(THOUSANDS.fullmatch, signed)) and all(map(BELOW.fullmatch, plain))
     return next((cell for cell in signed if cell.endswith("0")), None) if told else None
+
+
+HEAD_THOUSANDS = re.compile(r"^(\D*?)([1-9]\d{0,2}(?:\.\d{3})+)(?![\d.])")
+
+
+def without_thousands(meta: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """Return a header without the points between thousands, of a file whose decimals have commas; and what is said.
+
+    Examples
+    --------
+    >>> without_thousands({"Abtastrate": "25.600 Hz", "dt": "0.001 s"})[0]
+    {'Abtastrate': '25600 Hz', 'dt': '0.001 s'}
+    """
+    found, said = dict(meta), []
+    for name, value in meta.items():
+        match = HEAD_THOUSANDS.match(value) if isinstance(value, str) else None
+        if match is None:
+            continue
+        plain = match[2].replace(".", "")
+        found[name] = match[1] + plain + value[match.end() :]
+        said.append(
+            f"{name} = {match[2]!r} is read as {plain}: decimals of the file have commas, its thousands points."
+        )
+    return found, said
 
 
 def thousands_column(rows: Sequence[Sequence[str]], names: Sequence[str], decimal: str) -> tuple[str, str] | None:

@@ -33,6 +33,7 @@ from gearmbs.signals.files.cells import (
     split_cells,
     thousands_column,
     with_minus,
+    without_thousands,
 )
 from gearmbs.signals.files.encodings import encoding_of, utf16_without_mark
 from gearmbs.signals.files.labview import read_lvm
@@ -67,7 +68,9 @@ from gearmbs.signals.signal.record import (
     rate_candidates,
     speed_of,
 )
+from gearmbs.signals.signal.shapes import is_missing
 from gearmbs.signals.signal.signal import ROUNDED_TIMES, UNKNOWN_UNITS, check_teeth
+from gearmbs.signals.signal.times import rate_about_even
 from gearmbs.signals.signal.words import words_of
 from gearmbs.wording import warn
 
@@ -166,7 +169,7 @@ def read_csv(
             values, clock, said = one.values, one.times, [*said, *one.said]
             layout = replace(layout, groups=(), clock=one.clock, beside=(*layout.beside, *one.left_out))
         said += [] if pulses else _bridged(path, values, layout, gaps, channels)
-        found = _record(path, values, clock, layout, rate)
+        found = _record(path, values, clock, layout, rate, pulses)
         said += _end_checked(path, packed, layout, count)
         return replace(found, notes=[*found.notes, *said]) if said else found
 
@@ -314,6 +317,8 @@ def _layout(path: Path, packed: bool, pulses: bool = False) -> CsvLayout:
             f"{threes[0]!r} holds {threes[1]!r} beside numbers below 1000 without {layout.decimal!r}, which looks like "
             f"one between thousands; {WITHOUT}, or all of them with the same decimals",
         )
+    plain, said = without_thousands(layout.meta) if layout.decimal == "," else (layout.meta, [])
+    layout = replace(layout, meta=plain, notes=[*layout.notes, *said])
     groups = () if pulses or layout.stamps else own_clocks(layout.names, layout.units)
     clocks = [clock for clock, _ in groups]
     return replace(layout, groups=groups, index=None if layout.index in clocks else layout.index)
@@ -406,6 +411,7 @@ def _blocks(
                 numbers = block.drop(columns=list(words)) if words else block
                 values = np.full((len(block), width), np.nan)
                 values[:, numbers.columns] = numbers.to_numpy()
+                values[is_missing(values)] = np.nan
                 wanted = [i for i in range(width) if i not in {*words, *layout.empty, *slow}]
                 if refuse and not np.isfinite(values[:, wanted]).all():
                     raise ValueError("missing values")
@@ -418,7 +424,12 @@ def _blocks(
 
 
 def _record(
-    path: Path, values: np.ndarray, clock: np.ndarray | None, layout: CsvLayout, given: float | None = None
+    path: Path,
+    values: np.ndarray,
+    clock: np.ndarray | None,
+    layout: CsvLayout,
+    given: float | None,
+    pulses: bool = False,
 ) -> Record:
     candidates = rate_candidates(layout.meta)
     t0 = number_of(layout.meta.get("t0"))
@@ -449,7 +460,7 @@ def _record(
     said: list[str] = []
     if clock is not None and len(clock) > 1:
         start = float(clock[0])
-        by_clock = rate_by_times(clock, path, given, bool(candidates))
+        by_clock = rate_about_even(clock) if pulses else rate_by_times(clock, path, given, bool(candidates))
         if by_clock is not None and candidates:
             sure = [c for c in candidates if not c.weak]
             candidates = [*sure, RateCandidate("the column of times", by_clock), *(c for c in candidates if c.weak)]
@@ -537,8 +548,9 @@ def _first_bad_line(
                     shown = f"{cell[:40]!r} in column {layout.names[column]!r}"
                     remedy = f"; {CHOOSE}" if width > MOST_ALONE else ""
                     return f"line {number} holds {shown}, which is not a number{remedy}", column
-                if refuse and not np.isfinite(float(cell.replace(",", ".") if layout.decimal == "," else cell)):
-                    return f"line {number} holds {cell[:40]!r}; {REMEDY}", None
+                value = float(cell.replace(",", ".") if layout.decimal == "," else cell) if kind == "number" else 0.0
+                if refuse and is_missing(np.array(value)) and column not in layout.slow:
+                    return f"line {number} holds {cell[:40]!r}, which instruments write for no number; {REMEDY}", None
     return f"cannot be read as a table ({exc})", None
 
 

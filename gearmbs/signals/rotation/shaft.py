@@ -233,7 +233,11 @@ def known_shaft(
     rest = [c for c in signal["channel"].values.tolist() if c != helper]
     if not rest:
         word = "tacho" if known.tacho else "speed_channel"
-        raise SignalError(f"{word}: {helper!r} is the only channel, nothing is left to analyse")
+        alone = (
+            "; its torsional vibration is that of torsional_vibration(pulses_of_channel(signal, lines)), see "
+            "docs/howto/transmission_error.md"
+        ) * (known.tacho is not None)
+        raise SignalError(f"{word}: {helper!r} is the only channel, nothing is left to analyse{alone}")
     times = phase["time"].values
     mean = float(phase.values[-1] - phase.values[0]) / float(times[-1] - times[0])
     origin = (
@@ -294,7 +298,9 @@ def refined_speed(signal: xr.DataArray, nominal: float) -> tuple[float, list[int
     height = prominence(power).max(axis=1)
     width = rate / n
     shaft = nominal / math.tau
-    span = SPEED_TOLERANCE * shaft
+    # at the ends of the reach a line is spread over those beside it
+    reach = SPEED_TOLERANCE * shaft + 0.5 * width
+    span = SPEED_TOLERANCE * shaft + width
     if shaft < 8.0 * width:
         return None
     candidates = np.linspace(
@@ -309,11 +315,11 @@ def refined_speed(signal: xr.DataArray, nominal: float) -> tuple[float, list[int
     if not present:
         return None
     best = int(np.argmax(total))
-    if math.sqrt(total[best] / present) < MIN_SCORE_DB or best in (0, candidates.size - 1):
+    if math.sqrt(total[best] / present) < MIN_SCORE_DB:
         return None
     coarse = float(candidates[np.isclose(total, total[best])].mean())
     refined, orders = _from_peaks(power.max(axis=1), height, coarse, width)
-    return (refined * math.tau, orders) if orders else None
+    return (refined * math.tau, orders) if orders and abs(refined - shaft) <= reach else None
 
 
 def _from_peaks(power: np.ndarray, height: np.ndarray, shaft: float, width: float) -> tuple[float, list[int]]:
@@ -328,7 +334,7 @@ def _from_peaks(power: np.ndarray, height: np.ndarray, shaft: float, width: floa
         if middle + 3 >= power.size or middle < 3:
             continue
         i = middle - 2 + int(np.argmax(power[middle - 2 : middle + 3]))
-        if height[i] < MIN_SCORE_DB:
+        if height[i] < MIN_SCORE_DB or power[i] < max(power[i - 1], power[i + 1]):
             continue
         a, b, c = np.log(np.maximum(power[i - 1 : i + 2], 1e-300))
         curve = a - 2.0 * b + c

@@ -45,6 +45,8 @@ MIN_SCORE_DB = 12.0
 """Mean height of harmonics from which a comb is believed at once."""
 SAME_COMB = 0.01
 """Relative difference of frequencies up to which candidates belong to one comb."""
+ALONE_BELOW = 0.35
+"""Part of the sampling rate below which the mesh line may be the only harmonic there: its band fits below half."""
 MIN_OTHERS = 100
 """Combs of other frequencies, at least, of which the best tells what chance gives: among a hundred it is at 2.5
 standard deviations, and of fewer their own standard deviation is known badly."""
@@ -146,7 +148,7 @@ def estimate_speed(
         Tooth count of the wheel whose speed is wanted (first); default the signal's.
     speed_range : pair of float or str, optional
         Lowest and highest speed to look for, rad/s or texts. Default: from 240 rpm to where two harmonics
-        fit below half the sampling rate.
+        fit below half the sampling rate, or one where no other line is there.
 
     Returns
     -------
@@ -238,7 +240,12 @@ def find_comb(
         )
     lines = Lines(power, height, bin_width)
     guess = float(candidates[best])
-    one, others = (lines.explained(guess, count), []) if ahead else choose(lines, guess, count, low_gmf, high_gmf)
+    one, others = lines.explained(guess, count), []
+    # a comb of each second or third of its harmonics lives on those of another one, whose double may lie too high
+    ahead = ahead and (not one.harmonics or math.gcd(*one.harmonics) == 1)
+    if not ahead:
+        top = high_gmf if speed_range is not None else max(high_gmf, ALONE_BELOW * rate)
+        one, others = choose(lines, guess, count, low_gmf, top)
     about = one.gmf if one.harmonics else guess
     first = one.harmonics[0] if one.harmonics else 1
     gmf = _peak(power, first * about, bin_width) / first

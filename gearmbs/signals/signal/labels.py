@@ -17,6 +17,7 @@ import xarray as xr
 
 from gearmbs.signals.errors import MissingMetadataError, SignalError
 from gearmbs.signals.signal.loads import LOAD_WORDS, is_slow_load, is_unit_of_load, load_of, perhaps
+from gearmbs.signals.signal.shapes import goes_on, steps_between_two_levels
 from gearmbs.signals.signal.signal import UNKNOWN_UNITS, shaft_coords, units_of, with_metadata
 from gearmbs.signals.signal.times import SECONDS, SUFFIX
 from gearmbs.signals.signal.units import detected_unit, is_usual, scaled, unit_dimension
@@ -79,7 +80,15 @@ SLOW = 0.05
 are as large."""
 
 SHARES = frozenset(("%", "percent"))
-Role = Literal["time", "speed", "tacho", "temperature", "count", "angle", "share", "frequency", "travel"]
+ANGLE_WORDS = ANGLE_UNITS | frozenset(
+    "rev revs revolution revolutions turn turns u umdr umdrehung umdrehungen tr tour tours ot count counts tick ticks "
+    "inc increments pulses lines v mv 1 - -- unknown".split()
+    + [""]
+)
+"""Units, of none too, of columns that are angles or counts if they rise so, and of no vibration then."""
+Role = Literal[
+    "time", "speed", "tacho", "pulses", "temperature", "count", "angle", "turns", "share", "frequency", "travel"
+]
 SLOW_ROLES = ("speed", "temperature", "share", "frequency", "travel")
 """Columns of these may have fewer samples than the others, and are interpolated."""
 UNIT_ASKED = "The unit of the speed in "
@@ -88,9 +97,11 @@ WORDS: dict[str, str] = {
     "time": "holds times",
     "speed": "holds the speed",
     "tacho": "holds the pulses of a tacho",
+    "pulses": "steps between two levels, as the pulses of a tacho do,",
     "temperature": "holds a temperature",
     "count": "counts or tells time: it rises evenly",
     "angle": "holds the angle of a shaft",
+    "turns": "rises throughout, or again and again from end to end, as angles and counts do,",
     "share": "holds percents, as of a load,",
     "frequency": "holds a frequency",
     "travel": "holds the speed of something that is no shaft",
@@ -189,8 +200,10 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
     ----------
     name, unit : str
     values : ndarray, optional
-        Where they are known, columns that rise evenly are counts or times, angles that go on are a shaft's, and one
-        that is called n and has no unit is a speed only if it keeps its sign and is nearly constant or changes slowly.
+        Where they are known, columns that rise evenly are counts or times, angles that go on are a shaft's, one that is
+        called n and has no unit is a speed only if it keeps its sign and is nearly constant or changes slowly, and
+        what stands at one of two levels or goes on from end to end is no vibration whatever it is called
+        (`gearmbs.signals.signal.shapes`).
     """
     key, low = key_of(name)[0], unit.strip().lower()
     unknown = low in ("", UNKNOWN_UNITS, "-")
@@ -223,7 +236,16 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
     if values is not None and rises_evenly(values) and (unknown or timed or COUNT_COLUMN.match(key)):
         return "count"
     # of no vibration either, as a voltage for the speed, or a unit that nobody knows
-    return "speed" if named and ((electric and len(key) > 1) or not _of_vibration(unit)) else None
+    if named and ((electric and len(key) > 1) or not _of_vibration(unit)):
+        return "speed"
+    return None if values is None else _by_shape(low, values)
+
+
+def _by_shape(low: str, values: np.ndarray) -> Role | None:
+    """Return what a column is by its values alone, whatever its name: pulses in any unit, angles where none is told."""
+    if steps_between_two_levels(values):
+        return "pulses"
+    return "turns" if low in ANGLE_WORDS and goes_on(values) else None
 
 
 def _turns(low: str) -> bool:
@@ -365,7 +387,9 @@ def measured(
             f"{UNIT_ASKED}{column!r} {what}; say it to use it: units={{{column!r}: 'rpm'}} (--units '{column}=rpm')."
         )
     elif not known:
-        pulses = [name for name, role in told.items() if role == "tacho"][:1]
+        pulses = sorted(
+            (n for n, role in told.items() if role in ("tacho", "pulses")), key=lambda n: told[n] != "tacho"
+        )[:1]
         notes += [
             f"If {name!r} is the frequency of the shaft, say so: speed_channel={name!r} (--speed-channel '{name}')."
             for name, role in told.items()

@@ -16,6 +16,7 @@ import xarray as xr
 from gearmbs.files import json_value
 from gearmbs.signals.errors import MissingMetadataError, SignalError, SignalFileError
 from gearmbs.signals.signal.labels import RPM_UNITS, key_of, may_be_times, rises_evenly
+from gearmbs.signals.signal.shapes import is_missing
 from gearmbs.signals.signal.signal import (
     ROUNDED_TIMES,
     SHAFT,
@@ -277,14 +278,15 @@ def without_gaps(values: np.ndarray, gaps: str | None, rate: float | None = None
         If there are gaps and `gaps` is "refuse", or nothing is left.
     """
     how = checked_gaps(gaps)
-    bad = ~np.isfinite(values)
+    bad = is_missing(values)
     if not bad.any():
         return values, 0, []
     row, column = (int(i) for i in np.argwhere(bad)[0])
     count = int(bad.any(axis=1).sum())
     if how == "refuse":
         raise SignalError(
-            f"data: {int(bad.sum())} samples are not finite, the first at row {row}, channel {column}; {REMEDY}"
+            f"data: {int(bad.sum())} samples are not finite, or 9.9E+37 as instruments write it, the first at row "
+            f"{row}, channel {column}; {REMEDY}"
         )
     if bad.all(axis=0).any():
         raise SignalError(f"gaps: channel {int(np.argmax(bad.all(axis=0)))} holds no sample at all; leave it out")

@@ -87,3 +87,15 @@ def in_seconds(times: np.ndarray, unit: str = "", name: str = "", origin: float 
     # whole numbers of ns have more digits than a float
     begin = times[:1] if origin is None else origin
     return (times - begin) * factor if largest * factor > LARGEST else times.astype(float) * factor
+
+
+ROUNDED_STEP = 0.6
+"""Steps by which rounded times may be off even ones: half of one, and what the last one is."""
+
+
+def rate_about_even(clock: np.ndarray) -> float | None:
+    """Return the rate (Hz) of times (s) that are even but for rounding, or None of others."""
+    span = float(clock[-1] - clock[0])
+    even = clock[0] + span * np.linspace(0.0, 1.0, clock.size)
+    step = span / max(1, clock.size - 1)
+    return 1.0 / step if step > 0.0 and bool(np.abs(clock - even).max() < ROUNDED_STEP * step) else None
