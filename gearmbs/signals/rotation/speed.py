@@ -240,7 +240,8 @@ def find_comb(
         )
     lines = Lines(power, height, bin_width)
     guess = float(candidates[best])
-    one, others = lines.explained(guess, count), []
+    one: Explained = lines.explained(guess, count)
+    others: list[Explained] = []
     # a comb of each second or third of its harmonics lives on those of another one, whose double may lie too high
     ahead = ahead and (not one.harmonics or math.gcd(*one.harmonics) == 1)
     if not ahead:
