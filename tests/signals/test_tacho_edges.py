@@ -93,7 +93,7 @@ def test_pulses_too_many_or_missing_at_the_ends_are_left_out(fault):
     # an edge is known to half a sample, 0.4 % of a turn
     assert speed == pytest.approx(1500.0, rel=1e-4)
     assert lines == pytest.approx(LINES, rel=0.03)
-    assert "left out" in notes
+    assert "it is cut there" in notes
     assert "varies" not in notes
 
 

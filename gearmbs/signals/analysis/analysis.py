@@ -387,7 +387,7 @@ def _fitting_harmonics(rate: float, gmf: float, options: AnalysisOptions, notes:
         each = f"{pulses:g} pulse{'s' * (pulses != 1)} a turn"
         tacho = (
             f"; the tacho {options.tacho!r} gives {shaft.speed * 30.0 / math.pi:.0f} rpm with {each}: if it has more, "
-            "say how many with pulses_per_rev=... (--pulses)"
+            "say how many (--pulses)"
         ) * shaft.tacho
         raise SignalError(
             f"gmf: the band around {gmf:g} Hz does not fit below half the sampling rate ({rate / 2:g} Hz){tacho}"

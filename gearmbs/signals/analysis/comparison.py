@@ -219,7 +219,7 @@ def _inside(
         )
     if not gone:
         return numbers, []
-    return inside, [f"{gone}: left out, as beyond the band of {band[0]:g} to {band[1]:g} Hz nothing is left of them."]
+    return inside, [f"{gone}: left out, for the conversion keeps {band[0]:g} to {band[1]:g} Hz alone."]
 
 
 def _other_speeds(found: Mapping[tuple[str, str], xr.Dataset], reference: str) -> list[str]:

@@ -75,7 +75,7 @@ def positions_of(
             "add a column of times, or pass rate='20 kHz' (--rate) of its samples; columns of pulses hold times, s",
         )
     if turn is None and np.mean(np.diff(column) != 0.0) == 0.0:
-        raise SignalFileError(path, f"{name!r} holds one position throughout; nothing turns")
+        raise SignalFileError(path, f"{name!r} holds one position throughout; the shaft stands still")
     return Positions(begin + np.arange(column.size) / rate, column, turn)
 
 

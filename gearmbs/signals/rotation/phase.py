@@ -213,7 +213,7 @@ def _ends_said(edges: np.ndarray, begin: int, end: int) -> str:
         return ""
     return (
         f"{' and '.join(parts)} of its pulses come in intervals unlike those beside them, as where one is missing or "
-        "too many at the end of a record; they are left out, and the record ends there."
+        "too many at the end of a record; it is cut there."
     )
 
 

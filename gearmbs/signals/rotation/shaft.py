@@ -32,7 +32,6 @@ def shaft_phase(
     pulses_per_rev: float = 1.0,
     speed_channel: str | None = None,
     needed_for: str = "order tracking",
-    smooth: bool = False,
 ) -> xr.DataArray:
     """Angle of the shaft over time, from the one thing that is known of it.
 
@@ -50,8 +49,6 @@ def shaft_phase(
         Channel that holds the speed, in its own unit (rpm, Hz, rad/s).
     needed_for : str
         Completes the message where nothing is known.
-    smooth : bool
-        Whether edges of the tacho scatter, and the smoothest course through them is wanted (`phase_from_tacho`).
 
     Returns
     -------
@@ -75,7 +72,7 @@ def shaft_phase(
     if phase is not None:
         return _given_angle(phase)
     if tacho is not None:
-        return phase_from_tacho(signal, tacho, pulses_per_rev=pulses_per_rev, smooth=smooth)
+        return phase_from_tacho(signal, tacho, pulses_per_rev=pulses_per_rev)
     if speed_channel is not None:
         return phase_from_speed(signal, speed_of_channel(signal, speed_channel))
     if speed is None:
@@ -219,14 +216,17 @@ def known_shaft(
     if nominal is not None:
         return nominal, signal
     try:
-        phase = shaft_phase(
-            signal,
-            known.speed,
-            phase=known.phase,
-            tacho=known.tacho,
-            pulses_per_rev=known.pulses_per_rev,
-            speed_channel=known.speed_channel,
-            smooth=smooth,
+        phase = (
+            phase_from_tacho(signal, known.tacho, pulses_per_rev=known.pulses_per_rev, smooth=True)
+            if smooth
+            else shaft_phase(
+                signal,
+                known.speed,
+                phase=known.phase,
+                tacho=known.tacho,
+                pulses_per_rev=known.pulses_per_rev,
+                speed_channel=known.speed_channel,
+            )
         )
     except MissingMetadataError:
         return None, signal
