@@ -29,6 +29,7 @@ SHAPES = {
         "turns": np.floor(SWAYING),
         "counts": np.floor(1024 * SWAYING),
         "counts of a turn": np.floor(1024 * SWAYING) % 1024,
+        "a status that changes once": np.floor(0.6 * TIME),
         "status": np.floor(0.7 * TIME**2 * 10),
     },
     None: {

@@ -87,7 +87,11 @@ def _rises(values: np.ndarray) -> bool:
     span = float(np.ptp(values))
     down = steps < 0.0
     up = int(np.count_nonzero(steps > 0.0))
-    if not span > 0.0 or up < max(2, (1.0 - STILL) * steps.size):
+    if not span > 0.0:
+        return False
+    if not down.any() and np.array_equal(values, np.rint(values)):
+        return True
+    if up < max(2, (1.0 - STILL) * steps.size):
         return False
     falls = int(down.sum())
     return falls <= FALLS * up and bool(np.all(steps[down] <= -WHOLE_FALL * span)) and up > 2 * falls
