@@ -32,6 +32,8 @@ FEWEST_BLOWS = 8
 UNEVEN, SKIPPED = 0.015, 3
 """Part by which the time between blows may differ (swings of the speed, slip of bearings), and how many others, of a
 second defect or of light that fails, may stand between."""
+SHORTEST = 16
+"""Samples after which spikes may recur, at least: pieces of one drop-out are nearer to each other."""
 MEMORY = 100
 """Samples from which the next is predicted: three periods of a mesh line at 30 samples each."""
 ROUNDS = 3
@@ -227,8 +229,7 @@ def _recurring(column: np.ndarray, spikes: np.ndarray, lost: np.ndarray) -> tupl
     """Return families of spikes that recur, as blows do and light that fails by chance does not, and their samples."""
     families: list[_Recurring] = []
     spared = np.zeros_like(spikes)
-    # pieces of one drop-out are no family
-    places = _stretches(_widened(spikes))
+    places = _stretches(spikes)
     if len(places) < FEWEST_BLOWS:
         return families, spared
     off = column - _bridged(column, lost)
@@ -254,6 +255,9 @@ def _family(at: np.ndarray) -> tuple[np.ndarray, float]:
     n = at.size
     pairs = [(k, np.arange(n - k), at[k:] - at[:-k]) for k in range(1, SKIPPED + 1)]
     lags = np.sort(np.concatenate([lag for *_, lag in pairs]))
+    lags = lags[lags > SHORTEST]
+    if not lags.size:
+        return np.zeros(n, dtype=bool), math.nan
     many = np.searchsorted(lags, lags * (1.0 + UNEVEN), side="right") - np.searchsorted(lags, lags * (1.0 - UNEVEN))
     period = float(lags[int(np.argmax(many))])
     own = np.zeros(n, dtype=bool)
@@ -261,7 +265,8 @@ def _family(at: np.ndarray) -> tuple[np.ndarray, float]:
         near = first[np.abs(lag - period) <= max(UNEVEN * period, 1.0)]
         own[near] = own[near + k] = True
     between = np.diff(at)
-    even = np.flatnonzero(np.abs(np.diff(between)) <= np.maximum(UNEVEN * between[1:], 1.0))
+    even = np.abs(np.diff(between)) <= np.maximum(UNEVEN * between[1:], 1.0)
+    even = np.flatnonzero(even & (between[1:] > SHORTEST))
     running = np.zeros(n, dtype=bool)
     for k in range(3):
         running[even + k] = True
