@@ -38,6 +38,19 @@ def test_torsional_vibration_has_its_height_at_any_order(order):
     assert np.hypot(*lines) == pytest.approx(1e-3, rel=0.03 if order < 1.0 else 0.005)
 
 
+def test_what_filled_marks_cost_is_told():
+    """A wheel of 60-2-2: two gaps of three pitches take 7.3e-4 k^2 from order k, here a quarter of its wave apart."""
+    whole = train(5.0)
+    there = ~np.isin(whole.numbers % LINES, [10, 11, 43, 44])
+    found = torsional_vibration(pulse_train(whole.times[there], LINES))
+    (note,) = (note for note in found.attrs["notes"] if "straight lines" in note)
+    share = float(re.search(r"k ([\d.]+) k\^2 %", note)[1]) / 100.0
+    turned = math.tau * 5.0 * found["angle"].values
+    lines = np.linalg.lstsq(np.stack((np.sin(turned), np.cos(turned)), 1), found.values[:, 0], rcond=None)[0]
+    assert 1.0 - np.hypot(*lines) / 1e-3 == pytest.approx(25.0 * share, rel=0.15)
+    assert not any("straight lines" in note for note in torsional_vibration(whole).attrs["notes"])
+
+
 def test_a_shaft_that_runs_down_vibrates_no_more_for_it():
     times = np.linspace(0.0, 6.0, 30000)
     angle = SPEED * times - 2.0 * times**2
