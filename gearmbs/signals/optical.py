@@ -265,8 +265,8 @@ def _family(at: np.ndarray) -> tuple[np.ndarray, float]:
         near = first[np.abs(lag - period) <= max(UNEVEN * period, 1.0)]
         own[near] = own[near + k] = True
     between = np.diff(at)
-    even = np.abs(np.diff(between)) <= np.maximum(UNEVEN * between[1:], 1.0)
-    even = np.flatnonzero(even & (between[1:] > SHORTEST))
+    alike = np.abs(np.diff(between)) <= np.maximum(UNEVEN * between[1:], 1.0)
+    even = np.flatnonzero(alike & (between[1:] > SHORTEST))
     running = np.zeros(n, dtype=bool)
     for k in range(3):
         running[even + k] = True
