@@ -171,3 +171,16 @@ def test_zones_need_a_record_as_long_and_as_fast_as_their_band():
     assert slow["zone"][0] == "D"
     assert slow["meaning"][0].startswith("at least")
     assert "200 Hz" in slow["meaning"][0]
+
+
+def test_zones_of_ones_own_limits_of_velocity():
+    """As of a standard for gear units: 3 mm/s is in zone C of the tables, in B of these."""
+    time = np.arange(50000) / 10000.0
+    wave = 3.0 * np.sqrt(2.0) * np.cos(2 * np.pi * 25 * time)
+    known = {"rate": 10000.0, "units": "mm/s"}
+    assert vibration_zones(wave, "1500 rpm", **known)["zone"][0] == "C"
+    own = vibration_zones(wave, "1500 rpm", velocity=("2 mm/s", "4 mm/s", 0.008), **known)
+    assert own["velocity_zone"][0] == "B"
+    for wrong in (("4 mm/s", "2 mm/s", "8 mm/s"), ("2 mm/s", "4 mm/s")):
+        with pytest.raises(SignalError, match=says("velocity", "zones", "increase")):
+            vibration_zones(wave, "1500 rpm", velocity=wrong, **known)

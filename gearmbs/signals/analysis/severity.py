@@ -56,6 +56,7 @@ def vibration_zones(
     *,
     group: Literal[1, 2] = 2,
     support: Literal["rigid", "flexible"] = "rigid",
+    velocity: Sequence[Quantity] | None = None,
     displacement: Sequence[Quantity] | None = None,
     **_data: Unpack[DataKeywords],
 ) -> pd.DataFrame:
@@ -73,6 +74,9 @@ def vibration_zones(
     support : {"rigid", "flexible"}
         Rigid if the lowest natural frequency of machine and support in the direction measured is a quarter above the
         speed.
+    velocity : sequence of three floats or str, optional
+        Upper ends of zones A, B and C of the velocity, m/s RMS or text, in place of those by `group` and `support`: of
+        another standard, as ISO 20816-9 of gear units, or of one's own machines. The band stays the same.
     displacement : sequence of three floats or str, optional
         Upper ends of zones A, B and C of the displacement, m RMS or text, as your copy of the standard has them.
         Without them velocities alone are judged; below 600 rpm they are needed.
@@ -114,8 +118,10 @@ def vibration_zones(
             "displacement=('... um', '... um', '... um')"
         )
     limits: dict[str, tuple[float, ...]] = {"velocity": LIMITS[group, support]}
+    if velocity is not None:
+        limits["velocity"] = _ends(velocity, "velocity", "m/s")
     if displacement is not None:
-        limits["displacement"] = _ends(displacement)
+        limits["displacement"] = _ends(displacement, "displacement", "m")
     rate = rate_of(signal)
     band = (10.0 if rpm >= SLOW else 2.0, min(TOP, 0.5 * rate))
     duration, least = signal.sizes["time"] / rate, FEWEST_PERIODS / band[0]
@@ -143,10 +149,10 @@ def vibration_zones(
     return pd.DataFrame(rows, columns=columns)
 
 
-def _ends(displacement: Sequence[Quantity]) -> tuple[float, ...]:
-    """Return the upper ends of three zones in m."""
-    given = (displacement,) if isinstance(displacement, str) else tuple(displacement)
-    ends = tuple(to_si(end, "m", "displacement") for end in given)
+def _ends(told: Sequence[Quantity], name: str, unit: str) -> tuple[float, ...]:
+    """Return the upper ends of three zones in a unit of SI."""
+    given = (told,) if isinstance(told, str) else tuple(told)
+    ends = tuple(to_si(end, unit, name) for end in given)
     if len(ends) != len(ZONES) - 1 or not all(a < b for a, b in zip((0.0, *ends), ends)):
-        raise SignalError(f"displacement: {displacement!r} are not the upper ends of zones A, B and C, which increase")
+        raise SignalError(f"{name}: {told!r} are not the upper ends of zones A, B and C, which increase")
     return ends
