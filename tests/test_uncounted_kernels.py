@@ -5,12 +5,15 @@ that caller down. One that allocates, or returns an array, then fails or not by 
 of its own.
 """
 
+import ast
 import importlib
 import inspect
 import re
+from pathlib import Path
 
 import pytest
 
+import gearmbs
 from gearmbs.kernels import PLAIN
 from gearmbs.kernels.calls import address, callees, kernel_modules, kernels
 
@@ -42,6 +45,45 @@ def unsaid(first):
             if COUNTS.search(inspect.getsource(callee.py_func)):
                 found.add(address(callee))
     return found
+
+
+def called_outside_kernels(addresses):
+    """Return where kernels, as "module:name", are called by what is no kernel itself."""
+    found = []
+    folder = Path(gearmbs.__file__).parent
+    for path in sorted(folder.rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        imported = {
+            alias.asname or alias.name: (f"{node.module}:{alias.name}", f"{node.module}.{alias.name}")
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        kernel = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)
+                  and any("jit" in ast.unparse(d) for d in node.decorator_list)]  # fmt: skip
+        inside = {id(node) for one in kernel for node in ast.walk(one)}
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Call) or id(node) in inside:
+                continue
+            module, _, name = ast.unparse(node.func).rpartition(".")
+            called, _ = imported.get(name, ("", "")) if not module else ("", "")
+            if module in imported:
+                called = f"{imported[module][1]}:{name}"
+            if called in addresses:
+                found.append(f"{path.relative_to(folder)}:{node.lineno}: {called}")
+    return found
+
+
+def test_python_asks_no_kernel_without_counts_for_arrays():
+    """What it would be handed is freed under it: the interpreter crashed, or not, by what was compiled before."""
+    returns = re.compile(r"return [^\n]*(vector_at|matrix_at|Tables)\(")
+    handed = {
+        address(kernel)
+        for kernel in loaded()
+        if kernel.options.get("_nrt") is False and returns.search(inspect.getsource(kernel.py_func))
+    }
+    assert PLAIN or "gearmbs.dae.equations.layout:unpack" in handed
+    assert called_outside_kernels(handed) == []
 
 
 @pytest.mark.slow

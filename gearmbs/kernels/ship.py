@@ -94,9 +94,9 @@ def _compile(root: Path, kernels: Path, modules: list[str] | None, told: Path) -
     ]
     if modules is None:
         steps += ["from gearmbs.native.ahead import compile_objects", f"files += compile_objects({name!r}, print)"]
-    steps.append(f"Path({str(told)!r}).write_text('\\n'.join(files))")
+    steps.append(f"Path({str(told)!r}).write_text('\\n'.join(files), encoding='utf-8')")
     _run(sys.executable, "-P", "-c", "\n".join(steps), environment=own, folder=root, shown=True)
-    return told.read_text().splitlines()
+    return told.read_text(encoding="utf-8").splitlines()
 
 
 def current() -> list[str]:

@@ -315,3 +315,8 @@ def kinematics_in(idata: np.ndarray, work: np.ndarray) -> np.ndarray:
 def forces_in(idata: np.ndarray) -> np.ndarray:
     """Return the table of force elements, shape (elements, FORCE_COLUMNS)."""
     return rows_in(idata, int(idata[H_I_FORCE]), int(idata[H_FORCES]), FORCE_COLUMNS)
+
+
+def states_in(idata: np.ndarray) -> np.ndarray:
+    """Return the table of states of expressions, shape (states, STATE_COLUMNS)."""
+    return rows_in(idata, int(idata[H_I_STATE]), int(idata[H_STATES]), STATE_COLUMNS)

@@ -352,8 +352,7 @@ def settle_states(function, t, y, yp, idata, rdata) -> np.ndarray:
     if not count:
         return y
     out, work = np.zeros(y.size), np.zeros(int(idata[T.H_WORK]))
-    kinds = T.unpack(idata, rdata, work).state[:count, T.STATE_KIND]
-    places = first + np.flatnonzero(kinds == T.STATE_ALGEBRAIC)
+    places = first + np.flatnonzero(T.states_in(idata)[:, T.STATE_KIND] == T.STATE_ALGEBRAIC)
     # one may stand in the expression of another
     for _ in places:
         function(t, y, yp, out, idata, rdata, work)
