@@ -59,6 +59,13 @@ def test_shocks_and_silence_are_no_such_sample():
         ("Abtastrate [Hz];25.600\nDrehzahl [1/min];1.500\n", 25600.0, 1500.0),
         ("fs = 25600\nDrehzahl: 1.500 U/min\n", 25600.0, 1500.0),
         ("fs = 25,6 kHz\nDrehzahl: 1500,5 U/min\n", 25600.0, 1500.5),
+        ("Software version: 3.14\nAbtastrate: 25.600 Hz\nFaktor: 1.234\n", 25600.0, None),
+        # a prefix, another unit, another decimal point of the head, or what no shaft turns at
+        ("fs = 51.200 kHz\n", 51200.0, None),
+        ("dt = 1.000 ms\n", 1000.0, None),
+        ("fs = 25600\nDrehzahl: 24.985 1/s\n", 25600.0, 24.985 * 60.0),
+        ("gain: 0.25\nfs = 25600\nspeed: 25.125 rpm\n", 25600.0, 25.125),
+        ("fs = 25600\nDrehzahl: 999.850 rpm\n", 25600.0, 999.85),
     ],
 )
 def test_points_of_thousands_in_heads_above_decimal_commas(head, rate, rpm, tmp_path):

@@ -52,7 +52,20 @@ CASES = [(role, name) for role, each in SHAPES.items() for name in each]
 def test_shapes_tell_what_is_no_vibration(role, name):
     values = SHAPES[role][name]
     assert role_of("CH2", "unknown", values) == role
-    assert role_of("CH2", "m/s^2", values) == (role if role == "pulses" else None)
+    # of a unit of motion, what goes from zero to some volts
+    assert role_of("CH2", "m/s^2", values) == (role if role == "pulses" and name != "an encoder" else None)
+
+
+@pytest.mark.parametrize("unit", ["um", "m/s^2", "g", "mm/s"])
+def test_two_levels_with_a_unit_of_motion_are_vibration(unit):
+    """Teeth that rattle between their flanks, an overloaded accelerometer, and one that shows its last digit."""
+    rattle = 50.0 * np.sign(np.sin(2 * np.pi * TURNS)) + 2.0 * VIBRATION
+    overloaded = np.clip(30.0 * VIBRATION, -1.0, 1.0)
+    last_digit = 1e-3 * np.round(0.3 * np.cos(2 * np.pi * 100.0 * TIME) + 0.3)
+    for values in (rattle, overloaded, last_digit):
+        assert role_of("gap", unit, values) is None
+    assert role_of("gap", "um", 2.0 * (rattle + 50.0)) is None
+    assert role_of("ref", "V", rattle) == "pulses"
 
 
 def test_columns_of_pulses_and_angles_are_left_out_and_offered_as_a_tacho():

@@ -9,6 +9,8 @@ from typing import Any, Literal
 
 import pandas as pd
 
+from gearmbs.signals.signal.labels import RPM_UNITS, name_and_unit
+
 COMMENT = re.compile(r"^\s*[#%]")
 GAP_CELLS = frozenset(
     {"", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "-", "--", "<na>", "#num!", "inf", "-inf", "∞", "-∞", "+∞"}
@@ -82,26 +84,44 @@ def in_thousands(cells: Iterable[str], decimal: str) -> str | None:
     return next((cell for cell in signed if cell.endswith("0")), None) if told else None
 
 
-HEAD_THOUSANDS = re.compile(r"^(\D*?)([1-9]\d{0,2}(?:\.\d{3})+)(?![\d.])")
+HEAD_THOUSANDS = re.compile(r"^([1-9]\d{0,2}(?:\.\d{3})+)\s*(\S*)$")
+HEAD_DECIMAL = re.compile(r"^[+-]?(\d+\.\d+)(?:\s*[^\s\d.]\S*)?$")
+VERSION = re.compile(r"version|software|firmware|release|revision|serial", re.IGNORECASE)
+LARGEST = {"hz": 1e7, "rpm": 2e5}
+"""Of sampling rates and of speeds: what would be more has decimals."""
 
 
 def without_thousands(meta: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Return a header without the points between thousands, of a file whose decimals have commas; and what is said.
 
+    Rates in Hz and speeds in rpm are written with them, as whole numbers. A number of the header with another point
+    says that its points are decimal ones.
+
     Examples
     --------
-    >>> without_thousands({"Abtastrate": "25.600 Hz", "dt": "0.001 s"})[0]
-    {'Abtastrate': '25600 Hz', 'dt': '0.001 s'}
+    >>> without_thousands({"Abtastrate": "25.600 Hz", "Faktor": "1.234", "fs": "51.200 kHz"})[0]
+    {'Abtastrate': '25600 Hz', 'Faktor': '1.234', 'fs': '51.200 kHz'}
+    >>> without_thousands({"Abtastrate": "25.600 Hz", "dt": "0.039 s"})[0]
+    {'Abtastrate': '25.600 Hz', 'dt': '0.039 s'}
     """
+    texts = {name: value.strip() for name, value in meta.items() if isinstance(value, str)}
+    decimal = [
+        match[1] for name, text in texts.items() if not VERSION.search(name) and (match := HEAD_DECIMAL.match(text))
+    ]
+    if any(not HEAD_THOUSANDS.match(number) for number in decimal):
+        return dict(meta), []
     found, said = dict(meta), []
-    for name, value in meta.items():
-        match = HEAD_THOUSANDS.match(value) if isinstance(value, str) else None
+    for name, text in texts.items():
+        match = HEAD_THOUSANDS.match(text)
         if match is None:
             continue
-        plain = match[2].replace(".", "")
-        found[name] = match[1] + plain + value[match.end() :]
+        unit = (match[2] or name_and_unit(name)[1]).lower()
+        plain = match[1].replace(".", "")
+        if float(plain) > LARGEST.get("rpm" if unit in RPM_UNITS else unit, 0.0):
+            continue
+        found[name] = f"{plain} {match[2]}".rstrip()
         said.append(
-            f"{name} = {match[2]!r} is read as {plain}: decimals of the file have commas, its thousands points."
+            f"{name} = {match[1]!r} is read as {plain}: decimals of the file have commas, its thousands points."
         )
     return found, said
 

@@ -182,6 +182,10 @@ def unique_names(names: Sequence[str]) -> list[str]:
     return [n if named.count(n) == 1 else f"{n}_{named[:i].count(n) + 1}" for i, n in enumerate(named)]
 
 
+LOW_LEVEL = 0.1
+"""Part of the range within which the lower level of pulses is zero."""
+
+
 def rises_evenly(values: np.ndarray) -> bool:
     """Return whether a column is a straight line up, as times are, also rounded ones, and counts of rows."""
     if values.size < FEWEST_EVEN or not np.isfinite(values[[0, -1]]).all():
@@ -242,10 +246,26 @@ def role_of(name: str, unit: str, values: np.ndarray | None = None) -> Role | No
 
 
 def _by_shape(low: str, values: np.ndarray) -> Role | None:
-    """Return what a column is by its values alone, whatever its name: pulses in any unit, angles where none is told."""
-    if steps_between_two_levels(values):
+    """Return what a column is by its values alone, whatever its name: pulses, and angles where no unit is told."""
+    if steps_between_two_levels(values) and _may_be_pulses(low, values):
         return "pulses"
     return "turns" if low in ANGLE_WORDS and goes_on(values) else None
+
+
+def _may_be_pulses(low: str, values: np.ndarray) -> bool:
+    """Return whether what stands at two levels may be a tacho's pulses, by its unit.
+
+    Teeth that rattle, and an accelerometer that is overloaded or shows its last digit, stand at two levels, too, and
+    have their units. A unit that is told of all columns alike says less: pulses go from zero to some volts.
+    """
+    try:
+        motion = unit_dimension(low)[0]
+    except SignalError:
+        return True
+    least, span = float(values.min()), float(np.ptp(values))
+    return motion not in ("displacement", "velocity", "acceleration") or (
+        motion != "displacement" and span >= 1.0 and abs(least) <= LOW_LEVEL * span
+    )
 
 
 def _turns(low: str) -> bool:
