@@ -445,7 +445,9 @@ class Simulator(Sampled, Restored, Guessed):
             held.append("bodies that have been lumped (make it with lump=False)")
         if held:
             raise ModelError(f"simulator: it cannot go on without Python: it has {', '.join(held)}")
-        self.take_effect()
+        if self._settings.waiting or self._settings.led:
+            # lines that have ended, too
+            self._apply(self.t)
         if not self._run.started and (failure := self._run.begin()) is not None:
             self._failed = failure[1]
         if self._failed is not None:
