@@ -13,6 +13,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 import weakref
+import xml.etree.ElementTree as xml
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -94,6 +95,7 @@ class ForeignFMU:
             raise ModelError(f"{self.name}: it is of FMI {self.version}; export it by 2.0 or 3.0")
         self._variables = {variable.name: variable for variable in self._told.modelVariables}
         self._units = {unit.name: unit for unit in self._told.unitDefinitions}
+        self._relative = _stated_differences(Path(folder, "modelDescription.xml"))
         self._sources = dict(inputs or {})
         for name in self._sources:
             self._check(name, "input", self.inputs)
@@ -217,10 +219,13 @@ class ForeignFMU:
     def _unit(self, name: str, told: bool = False) -> tuple[float, float]:
         """Return the SI value of a variable's unit, and of its zero; let a unit that is not known be told."""
         variable = self._variables[name]
-        unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+        declared = variable.declaredType
+        unit = variable.unit or (declared.unit if declared is not None else None)
         defined = self._units.get(unit)
         if defined is not None and defined.baseUnit is not None:
-            return float(defined.baseUnit.factor), float(defined.baseUnit.offset)
+            # differences, as of temperatures, have no zero of their own
+            relative = self._relative.get(name, declared is not None and declared.relativeQuantity)
+            return float(defined.baseUnit.factor), 0.0 if relative else float(defined.baseUnit.offset)
         known = powers_of(unit.replace(".", " ")) if unit else None
         if told and unit and known is None and unit not in PLAIN:
             warn(
@@ -373,6 +378,17 @@ class _Next:
 
     def restore(self, numbers: np.ndarray) -> None:
         """The FMU goes back with the first input."""
+
+
+def _stated_differences(description: Path) -> dict[str, bool]:
+    """Return of each variable that says so whether it is a difference, which FMPy does not tell."""
+    found = {}
+    for variable in xml.parse(description).getroot().iterfind("ModelVariables/*"):
+        # of FMI 2.0 it stands in the element of the type
+        for element in (variable, *variable):
+            if "relativeQuantity" in element.attrib:
+                found[variable.get("name", "")] = element.get("relativeQuantity") in ("true", "1")
+    return found
 
 
 def _end(fmu: Any, phase: Mapping[str, bool]) -> None:

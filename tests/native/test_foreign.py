@@ -138,6 +138,22 @@ def test_units_are_those_of_the_fmu(integrator, tmp_path):
     assert torques[1] == pytest.approx(torques[0] * 2 * np.pi / 60, rel=1e-12)
 
 
+def test_differences_have_no_zero(integrator, tmp_path):
+    """The zero of a unit, as that of degC, is that of absolute quantities: FMI's relativeQuantity has none."""
+    off = changed(
+        integrator, tmp_path / "off.fmu", r'<BaseUnit s="-1" rad="1" ?/>', '<BaseUnit s="-1" rad="1" offset="5"/>'
+    )
+    relative = changed(off, tmp_path / "relative.fmu", r'unit="rad/s"', 'unit="rad/s" relativeQuantity="true"')
+    torques = []
+    for file in (integrator, off, relative):
+        sim = simulator()
+        ForeignFMU(file, {"load": 1.0}).control(sim, {"load": "speed"}, PERIOD)
+        sim.advance(0.5)
+        torques.append(sim.get("input", "load"))
+    assert torques[1] == pytest.approx(torques[0] + 5.0, rel=1e-12)
+    assert torques[2] == torques[0]
+
+
 def test_what_inputs_follow(integrator):
     """Outputs by name, quantities with a component, numbers and functions mean the same."""
     found = []
