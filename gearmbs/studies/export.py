@@ -79,7 +79,19 @@ def described_pairs(path: Path) -> dict[str, GearPair]:
         found = {path.stem: load_case(path).pair()}
     from gearmbs.gears import GearPair
 
-    named = {re.sub(r"\W", "_", name): pair for name, pair in found.items() if isinstance(pair, GearPair)}
+    named: dict[str, GearPair] = {}
+    known: dict[str, str] = {}
+    for name, pair in found.items():
+        if not isinstance(pair, GearPair):
+            continue
+        plain = re.sub(r"\W", "_", name)
+        other = known.setdefault(plain.lower(), name)
+        if other != name:
+            raise ValueError(
+                f"{path.name}: tables of the meshes {other!r} and {name!r} would be the same file, {plain!r}; rename "
+                "one of them"
+            )
+        named[plain] = pair
     if not named:
         raise ValueError(f"{path.name} has no mesh of teeth in contact, of which tables could be made")
     return named

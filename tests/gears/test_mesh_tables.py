@@ -12,6 +12,7 @@ from gearmbs.cli import app
 from gearmbs.gears import GearPair, GearSpec, kinematic_transmission_error, loaded_transmission_error, mesh_tables
 from gearmbs.gears.faults import PitchError
 from gearmbs.gears.transmission import StaticMesh
+from gearmbs.studies.export import described_pairs
 from tests.says import says
 
 
@@ -195,6 +196,35 @@ def test_planetary_sets_have_tables_of_both_meshes(tmp_path):
     texts = {which: (tmp_path / "set" / f"set_{which}.mo").read_text() for which in ("sun", "ring")}
     assert "z[2] = {28, 36}" in texts["sun"]
     assert "sign = -1" in texts["ring"]
+
+
+def two_stages(first, second):
+    shafts = "".join(f'[shafts.{shaft}]\nlength = "200 mm"\ndiameter = "30 mm"\n' for shaft in "abc")
+    wheels = "".join(
+        f'[wheels.z{k}]\nshaft = "{shaft}"\nstation = "{60 + 60 * (k // 2)} mm"\nteeth = {teeth}\nmodule = "3 mm"\n'
+        f'bore_radius = "15 mm"\n'
+        for k, (shaft, teeth) in enumerate([("a", 21), ("b", 52), ("b", 19), ("c", 47)])
+    )
+    meshes = "".join(
+        f'[meshes."{name}"]\ndriver = "z{k}"\ndriven = "z{k + 1}"\nbacklash = "0.1 mm"\n'
+        for k, name in ((0, first), (2, second))
+    )
+    bearings = "".join(f'[bearings.b{shaft}]\nkind = "ideal"\nshaft = "{shaft}"\n' for shaft in "abc")
+    ends = '[drives.m]\nkind = "speed"\nshaft = "a"\nspeed = "1000 rpm"\n[loads.l]\nkind = "torque"\nshaft = "c"\n'
+    return f'name = "two"\n{shafts}{wheels}{meshes}{bearings}{ends}torque = "200 N m"\n'
+
+
+def test_tables_are_of_all_meshes(tmp_path):
+    """Names of files have no other characters than letters, digits and underscores: two must not become one."""
+    file = tmp_path / "train.toml"
+    file.write_text(two_stages("stage-1", "stage 2"))
+    assert {name: pair.wheels[0].teeth for name, pair in described_pairs(file).items()} == {
+        "stage_1": 21,
+        "stage_2": 19,
+    }
+    file.write_text(two_stages("stage-1", "stage 1"))
+    with pytest.raises(ValueError, match=says("stage-1", "stage 1", "rename")):
+        described_pairs(file)
 
 
 def test_without_load_the_table_begins_at_contact():
