@@ -28,7 +28,7 @@ from gearmbs.kernels.calls import address, entries, import_all, kernel_modules, 
 from gearmbs.kernels.objects import compiled_object, file_of_object
 from gearmbs.kernels.pointers import no_events, no_hook
 from gearmbs.mechanism.language.series import evaluate_series
-from gearmbs.native.kernels import BY_ADDRESS, CALLED
+from gearmbs.native.kernels import BY_ADDRESS, CALLED, OF_MOTIONS
 from gearmbs.system import cores
 
 OF_EQUATIONS = (
@@ -46,7 +46,8 @@ def exportable() -> dict[str, tuple[Any, Any]]:
     held = {_types(signature) for signature in (FORCE_SIG, LAW_SIG, GEAR_CONTACT_SIG)}
     by_address = [k for k in entries(known) if k.declared_types() in held]
     plain = [*BY_ADDRESS, *OF_EQUATIONS, *by_address, *(k for k in known if k.late)]
-    return {address(k): (k, None) for k in plain} | {address(k): (k, signature) for k, signature in CALLED.values()}
+    called = [*CALLED.values(), *OF_MOTIONS.values()]
+    return {address(k): (k, None) for k in plain} | {address(k): (k, signature) for k, signature in called}
 
 
 def _types(signature: Any) -> tuple[tuple, Any]:

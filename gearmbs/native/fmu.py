@@ -92,14 +92,15 @@ def variables_of(
 
 
 def _vector(outputs: Sequence[Variable], k: int) -> Variable | None:
-    """Return the array that begins with an output, None if none does."""
+    """Return the array that begins with an output, None if none does: it has one unit."""
     of, _, first = outputs[k].name.rpartition(".")
+    unit = outputs[k].unit
     for components, name in VECTORS.items():
-        if [one.name for one in outputs[k : k + 3]] == [f"{of}.{c}" for c in components]:
+        if [(one.name, one.unit) for one in outputs[k : k + 3]] == [(f"{of}.{c}", unit) for c in components]:
             return outputs[k]._replace(name=f"{of}.{name}".rstrip("."), size=len(components))
     size = 0
     if first == "0":
-        while k + size < len(outputs) and outputs[k + size].name == f"{of}.{size}":
+        while k + size < len(outputs) and outputs[k + size][:2] == (f"{of}.{size}", unit):
             size += 1
     return outputs[k]._replace(name=of, size=size) if size > 1 else None
 

@@ -29,6 +29,7 @@ from gearmbs.kernels.jit import Kernel
 from gearmbs.kernels.pointers import address, no_events, no_hook
 from gearmbs.mechanism.language.series import evaluate_series
 from gearmbs.mechanism.solve.simulator import Begun
+from gearmbs.native.afresh import AFRESH_TYPE, start_afresh
 from gearmbs.native.driver import DRIVER_TYPE, go_to
 from gearmbs.native.pivots import ROOM_TYPE, choose_for_run
 from gearmbs.native.setting import apply, present_value
@@ -49,6 +50,13 @@ CALLED = {
     "factor_for_outputs": (factor_for_outputs, int64(DRIVER_TYPE, TELLER_TYPE, *_PLANNED)),
 }
 """Kernels that the hand-written part calls, by what it calls them, with their signatures (``source/model.h``)."""
+OF_MOTIONS = {
+    "start_afresh": (
+        start_afresh,
+        int64(FUNCTIONS_TYPE, STATE_TYPE, PART_TYPE, *_PLANNED, DRIVER_TYPE, *_ROOM, AFRESH_TYPE, int64),
+    ),
+}
+"""The same of models with inputs that prescribe motions."""
 
 
 BY_ADDRESS = (
@@ -73,10 +81,13 @@ class Kernels:
     ----------
     begun : Begun
         A run; its tables hold the addresses of the elements' kernels.
+    motions : bool
+        Whether inputs that prescribe motions can be set.
     """
 
-    def __init__(self, begun: Begun) -> None:
+    def __init__(self, begun: Begun, motions: bool) -> None:
         problem, model = begun.problem, begun.system.model
+        self._called = {**CALLED, **(OF_MOTIONS if motions else {})}
         self._by_name: dict[str, Any] = {
             **{kernel.__name__: kernel for kernel in BY_ADDRESS},
             "evaluate_rows": evaluate_rows,
@@ -126,7 +137,7 @@ class Kernels:
         from gearmbs.kernels.objects import compiled_object, object_of_function
 
         called = {}
-        for name, (kernel, signature) in CALLED.items():
+        for name, (kernel, signature) in self._called.items():
             report(name)
             called[name] = compiled_object(kernel, processor, signature, triple)
         numbered = []

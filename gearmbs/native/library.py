@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 import gearmbs
-from gearmbs.dae.problem import INPUT, ModelError
+from gearmbs.dae.problem import INPUT, ModelError, Number
 from gearmbs.files import write_whole
 from gearmbs.kernels import PLAIN
 from gearmbs.mechanism.mechanism import Mechanism
@@ -24,7 +24,7 @@ from gearmbs.mechanism.solve.simulator import Begun, Simulator
 from gearmbs.native.asked import Told
 from gearmbs.native.fmu import Description, variables_of, widths_of, write_fmu
 from gearmbs.native.kernels import Kernels
-from gearmbs.native.memory import Memory, memory_of
+from gearmbs.native.memory import Memory, Motions, memory_of
 from gearmbs.native.outputs import chosen_outputs
 from gearmbs.native.systems import SYSTEMS, System, c_compiler, system_of
 from gearmbs.wording import any_of
@@ -47,6 +47,8 @@ _BLOCK = {
 """How the memory of a run gets into a library, by the ending of its name."""
 FEWEST_ZEROS = 256
 """Zeros in a row that are not written to the library: a piece of memory takes 16 bytes in its list."""
+MOTION_ORDERS = 2
+"""Times that an input which prescribes a motion is integrated at most: an acceleration, to a position."""
 FLAGS = ("-O2", "-std=c11", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra")
 
 
@@ -65,7 +67,8 @@ class Exported:
     left_out : list of str
         Outputs of the mechanism that the library does not tell.
     held : list of str
-        Inputs of the mechanism that cannot be set, and keep their values: they prescribe motions.
+        Inputs of the mechanism that cannot be set, and keep their values: they prescribe positions, which cannot jump,
+        or motions of a run that steps end at given times of.
     processor : str
         What it runs on, of the first system.
     """
@@ -162,9 +165,10 @@ def export(
     numbers = {
         name: number
         for name, number in begun.problem.numbers.items()
-        if not number.prescribes and all(place.order == 0 for place in number.places)
+        if _can_be_set(number, begun.run.state.stops.size > 0)
     }
-    kernels, m = Kernels(begun), begun.system.mechanism
+    kernels = Kernels(begun, any(number.prescribes for number in numbers.values()))
+    m = begun.system.mechanism
     with markers_kept((m.ground, *m.bodies.values())):
         told, left = chosen_outputs(model, begun, list(numbers), outputs)
         names = ["time", *numbers, *(one.name for one in told)]
@@ -219,6 +223,14 @@ def _ending(name: str, asked: dict[str, System]) -> str:
     ending = asked[name].ending
     alone = [one.ending for one in asked.values()].count(ending) == 1
     return ending if alone or name == "linux" else f".{name}{ending}"
+
+
+def _can_be_set(number: Number, has_stops: bool) -> bool:
+    """Return whether a library takes other values of a number: not of what is a position."""
+    if not number.prescribes:
+        return all(place.order == 0 for place in number.places)
+    orders = [order for _, order in number.prescribes]
+    return number.kind == INPUT and not has_stops and all(0 < order <= MOTION_ORDERS for order in orders)
 
 
 def _silent(name: str) -> None:
@@ -289,9 +301,36 @@ def _texts(
         "counts": int(any(one.counted.starts for one in told)),
         "numbers": len(numbers), "outputs": len(told), "unknowns": begun.problem.n,
         **{key: key for key in names},
+        "motions": "0" if memory.motions is None else "&motions",
     }  # fmt: skip
+    if memory.motions is not None:
+        lines += _motions(begun, memory.motions, numbers)
     described = ",\n    ".join(f".{key} = {value}" for key, value in fields.items())
     return "\n".join(lines) + f"\n\nconst gearmbs_model gearmbs_this = {{\n    {described}\n}};\n", token
+
+
+def _motions(begun: Begun, motions: Motions, numbers: dict[str, Number]) -> list[str]:
+    """Return the tables of numbers of a model that an input may move."""
+    own = [number.moved_to(begun.cells) for number in numbers.values()]
+    places = [place for number in own for place in number.places]
+    first = np.cumsum([0, *(len(number.places) for number in own)]).tolist()
+    rows = [f"{{{p.at}, {p.size}, {p.order}, {float(p.factor)!r}, {float(p.offset)!r}}}" for p in places]
+    fields = {
+        "cells": len(begun.cells), "numbers": len(own), "cell": "motion_cell", "is_input": "motion_is_input",
+        "prescribes": "motion_prescribes", "first": "motion_first", "places": "motion_places",
+        "afresh": motions.afresh, "rdata": motions.rdata, "values": motions.values, "copies": len(motions.copies),
+        "copy": "motion_copy", "t_first": repr(float(begun.problem.t0)),
+    }  # fmt: skip
+    described = ", ".join(f".{key} = {value}" for key, value in fields.items())
+    return [
+        _array("const int64_t", "motion_cell", begun.cells.tolist()),
+        _array("const int64_t", "motion_is_input", [int(number.kind == INPUT) for number in own]),
+        _array("const int64_t", "motion_prescribes", [int(bool(number.prescribes)) for number in own]),
+        _array("const int64_t", "motion_first", first),
+        _array("const motion_place", "motion_places", rows),
+        _array("const int64_t", "motion_copy", [number for copy in motions.copies for number in copy]),
+        f"static const motion_tables motions = {{{described}}};",
+    ]
 
 
 def _compile(
@@ -320,7 +359,7 @@ def _compile(
         _BLOCK[system.ending],
     ]
     (room / "described.c").write_text("\n".join([*head, texts]), encoding="utf-8")
-    sources = ["gearmbs.c", "runtime.c", *others]
+    sources = ["gearmbs.c", "runtime.c", *others, *(["afresh.c"] if memory.motions is not None else [])]
     for file in (*sources, *HEADERS):
         (room / file).write_bytes(_source(file))
     names = [f"-Dgearmbs_{name}={one.symbol}" for name, one in called.items()]

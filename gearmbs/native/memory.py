@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.driver import Run
 from gearmbs.dae.integrators.run_state import RunState
+from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.integrators.stepping.jumps import TERMS
 from gearmbs.dae.linalg.entry_lists import NEGLIGIBLE, NEGLIGIBLE_IN_NEWTON
 from gearmbs.dae.linalg.left_out import signs_of_error
@@ -23,6 +25,7 @@ from gearmbs.dae.problem import INPUT, DAEProblem, Number
 from gearmbs.kernels.bound import NAMES
 from gearmbs.kernels.lanes import LANES
 from gearmbs.mechanism.solve.simulator import Begun
+from gearmbs.native.afresh import Afresh
 from gearmbs.native.asked import Expressions, Told, expressions_of
 from gearmbs.native.driver import Driver
 from gearmbs.native.image import CONSTANT, SCRATCH, STATE, Image, Layout, member_of, word_of
@@ -63,11 +66,31 @@ class Memory(NamedTuple):
         Offset of each struct.
     members : dict of str to int
         Offset of single members and arrays that are read and written from outside.
+    motions : Motions or None
+        None where no input that can be set prescribes a motion.
     """
 
     layout: Layout
     structs: dict[str, int]
     members: dict[str, int]
+    motions: Motions | None
+
+
+class Motions(NamedTuple):
+    """What is needed to start afresh where an input that prescribes a motion is set.
+
+    Attributes
+    ----------
+    afresh, rdata, values : int
+        Offsets of the struct `gearmbs.native.afresh.Afresh`, of the table of numbers, and of what is to stand there.
+    copies : list of (int, int, int)
+        From where to where so many bytes make the state of a run what it is before all steps.
+    """
+
+    afresh: int
+    rdata: int
+    values: int
+    copies: list[tuple[int, int, int]]
 
 
 class _Factored(NamedTuple):
@@ -97,6 +120,9 @@ def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], fun
     st = _state(begun)
     parts = {"run": image.struct(st, STATE, dict.fromkeys(("entry_row", "entry_col"), CONSTANT))}
     parts["part"] = image.struct(run.algebraic.part, STATE)
+    moved = any(number.prescribes for number in numbers.values())
+    copied = _as_before_all_steps(image, begun, st, parts) if moved else []
+    afresh = image.struct(_afresh(begun), STATE) if moved else -1
     parts["bound"] = _functions(image, begun.problem, function)
     matrix = run.indptr, run.indices, run.scale, run.counted
     assert run.plan is not None
@@ -144,7 +170,56 @@ def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], fun
         "out": teller.out,
     }
     members |= {name: image.places[image.array(array, STATE)] if array.size else 0 for name, array in arrays.items()}
-    return Memory(layout, structs, members)
+    motions = None
+    if moved:
+        copies = [(image.places[a], image.places[b], size) for a, b, size in copied]
+        rdata, values = (image.places[image.array(array, STATE)] for array in (st.rdata, driver.values))
+        motions = Motions(image.places[afresh], rdata, values, copies)
+    return Memory(layout, structs, members, motions)
+
+
+_STAYS = (
+    "entry_row", "entry_col", "idata", "rdata", "stops", "outputs", "y_out", "yp_out", "kept", "kept_out", "watched",
+    "record_y",
+)  # fmt: skip
+"""Arrays of a state that a start afresh leaves, or fills itself."""
+
+
+def _as_before_all_steps(
+    image: Image, begun: Begun, st: RunState, parts: Mapping[str, int]
+) -> list[tuple[int, int, int]]:
+    """Take in the state of a run that has not begun; return which parts are copied to which, and their bytes."""
+    run = begun.run
+    options = replace(run.options, history=None, check_start=False)
+    other = HeldRun(run.problem, float(run.state.t_end), options)
+    found = []
+    for name, own, new, stays in (
+        ("run", st, other.state, _STAYS),
+        ("part", run.algebraic.part, other.algebraic.part, ()),
+    ):
+        scalars = getattr(type(new), "words:").offset
+        bytes_of = np.frombuffer(bytes(new), dtype=np.uint8)[:scalars].copy()
+        found.append((image.array(bytes_of, CONSTANT), parts[name], scalars))
+        for member in type(new).array_members:
+            array = getattr(new, member)
+            if member not in stays and array.size:
+                found.append((image.array(array, CONSTANT), image.array(getattr(own, member), STATE), array.nbytes))
+    return found
+
+
+def _afresh(begun: Begun) -> Afresh:
+    """Return what starts a run afresh, at the start of the simulation or behind it."""
+    run, options = begun.run, begun.run.options
+    kinds = begun.system.model.states[:, T.STATE_KIND]
+    return Afresh(
+        first_given=options.first_step is not None,
+        first_step=options.first_step or 0.0,
+        smallest_given=options.min_step is not None,
+        smallest_step=options.min_step or 0.0,
+        y0=np.array(run.problem.y0, dtype=float),
+        yp0=np.array(run.problem.yp0, dtype=float),
+        settled=int(begun.problem.idata[T.H_Z]) + np.flatnonzero(kinds == T.STATE_ALGEBRAIC).astype(np.int64),
+    )
 
 
 def _state(begun: Begun) -> RunState:

@@ -404,6 +404,14 @@ def test_names_and_targets():
         export(m, "nowhere", t_end=1.0, target="fmu4")
 
 
+def test_arrays_have_one_unit():
+    """Names of components alone do not make a vector: numbers of other units stay by themselves."""
+    told = [Told(f"disc.{axis}", unit, ()) for axis, unit in (("x", "m"), ("y", "rad/s"), ("z", "N m"))]
+    told += [Told(f"s.{k}", unit, ()) for k, unit in enumerate(("rad", "rad", "N"))]
+    found = {one.name: (one.unit, one.size) for one in variables_of({}, told, arrays=True)}
+    assert found == {"disc.x": ("m", 0), "disc.y": ("rad/s", 0), "disc.z": ("N m", 0), "s": ("rad", 2), "s.2": ("N", 0)}
+
+
 def test_arrays(tmp_path):
     """Vectors of an FMU 3.0 as arrays are, number for number, what they are one by one; so are derivatives."""
     from fmpy.validation import validate_fmu

@@ -45,6 +45,7 @@ const char *gearmbs_message(int code) {
     case GEARMBS_STEP_TOO_SMALL:
         return "The step size fell to its lower limit before the requested accuracy was reached.";
     case GEARMBS_TOO_MANY_REJECTIONS: return "One step was rejected too many times.";
+    case GEARMBS_INCONSISTENT_START: return "The values at a start do not satisfy the equations.";
     case GEARMBS_TOO_MANY_STEPS: return "The limit on the number of steps was reached.";
     case GEARMBS_NEWTON_FAILURE:
         return "The corrector did not converge even with a fresh Jacobian at the smallest step.";
@@ -133,10 +134,35 @@ int gearmbs_number(gearmbs_instance *instance, size_t number, double *value) {
     return GEARMBS_OK;
 }
 
+#ifdef gearmbs_start_afresh
+/* Start afresh where an input that prescribes a motion has been set, or anything before the first step. */
+static int start_afresh(gearmbs_instance *i) {
+    const motion_tables *tables = model->motions;
+    int64_t *waiting = at(i, model->waiting), code = 0, steps = gearmbs_steps(i);
+    void *error = NULL;
+    int due = 0;
+    for (int64_t k = 0; k < tables->numbers; k++) due |= waiting[k] && (tables->prescribes[k] || steps == 0);
+    if (!due || !gearmbs_new_numbers(tables, gearmbs_time(i), at(i, tables->rdata), at(i, tables->values), waiting,
+                                     at(i, model->wanted)))
+        return GEARMBS_OK;
+    for (int64_t k = 0; k < tables->copies; k++)
+        memcpy(at(i, tables->copy[3 * k + 1]), at(i, tables->copy[3 * k]), (size_t)tables->copy[3 * k + 2]);
+    if (gearmbs_start_afresh(&code, &error, at(i, model->bound), at(i, model->run), at(i, model->part),
+                             at(i, model->plan), at(i, model->factors), at(i, model->driver), at(i, model->room),
+                             at(i, model->columns), at(i, model->rows), at(i, tables->afresh),
+                             steps > 0 || gearmbs_time(i) > tables->t_first))
+        return GEARMBS_KERNEL_FAILED;
+    return (int)code;
+}
+#endif
+
 /* Let what has been set take effect at the present time. */
 static int apply(gearmbs_instance *i, int64_t shows) {
     void *error = NULL;
     int64_t changes;
+#ifdef gearmbs_start_afresh
+    if (i->failure == GEARMBS_OK) i->failure = start_afresh(i);
+#endif
     if (i->failure == GEARMBS_OK &&
         gearmbs_apply(&changes, &error, at(i, model->bound), at(i, model->run), at(i, model->plan),
                       at(i, model->factors), at(i, model->driver), shows))

@@ -5,6 +5,24 @@
 
 #include <stdint.h>
 
+/* Inputs that prescribe motions, in models that have them. */
+enum { MOTION_ORDERS = 2 };
+
+typedef struct {
+    int64_t at, size, order;                   /* among the cells; coefficients; how often it is integrated there */
+    double factor, offset;
+} motion_place;
+
+typedef struct {
+    int64_t cells, numbers;
+    const int64_t *cell, *is_input, *prescribes, *first;
+    const motion_place *places;
+    int64_t afresh, rdata, values;             /* offsets */
+    int64_t copies;
+    const int64_t *copy;                       /* threes: from where to where so many bytes make a state that starts */
+    double t_first;                            /* where the simulation has started */
+} motion_tables;
+
 typedef struct {
     const char *name, *digest, *token;         /* digest: of the memory, 16 characters; token: of all */
     double t_start, t_end;
@@ -29,6 +47,7 @@ typedef struct {
     const char *const *number_names, *const *number_units;
     const char *const *output_names, *const *output_units;
     const char *const *unknown_names;
+    const motion_tables *motions;              /* NULL without any */
 } gearmbs_model;
 
 extern const gearmbs_model gearmbs_this;
@@ -46,6 +65,12 @@ int gearmbs_tell(int64_t *code, void **error, void *run, void *driver, void *tel
                  int64_t first);
 int gearmbs_choose_for_outputs(int64_t *code, void **error, void *run, void *driver, void *teller, void *room,
                                void *columns, void *rows, void *plan, void *factors);
+int gearmbs_start_afresh(int64_t *code, void **error, void *bound, void *run, void *part, void *plan, void *factors,
+                         void *driver, void *room, void *columns, void *rows, void *afresh, int64_t begun);
 int gearmbs_factor_for_outputs(int64_t *code, void **error, void *driver, void *teller, void *plan, void *factors);
+
+/* Write what is to stand in the cells where numbers have been set; return whether that is something else. */
+int gearmbs_new_numbers(const motion_tables *tables, double t, const double *rdata, double *values, int64_t *waiting,
+                        const double *wanted);
 
 #endif
