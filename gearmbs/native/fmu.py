@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -111,7 +112,7 @@ def widths_of(variables: Sequence[Variable]) -> list[int]:
 
 
 def _unit_name(unit: str) -> str:
-    return "1" if unit in ("1", "dimensionless") else unit.replace("*", " ")
+    return "1" if unit in ("1", "dimensionless") else re.sub(r"\^1(?![\d.])", "", unit.replace("*", " "))
 
 
 def _units(parent: xml.Element, variables: Sequence[Variable]) -> None:

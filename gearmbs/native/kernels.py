@@ -150,6 +150,12 @@ class Kernels:
                 numbered.append(object_of_function(kernel, processor, self._signatures[kernel], str(number), triple))
             except ValueError as error:
                 raise ModelError(str(error)) from None
+            except TypeError as error:
+                # numba's, of code that goes back to Python
+                raise ModelError(
+                    f"function {kernel.__name__!r}: it cannot be compiled without Python ({error}); leave out objmode "
+                    "and what else calls Python"
+                ) from None
         late: dict[str, Object] = {}
         waiting = [name for one in (*called.values(), *numbered) for name in one.late] if self.needs_late else []
         while waiting:

@@ -67,8 +67,8 @@ class Exported:
     left_out : list of str
         Outputs of the mechanism that the library does not tell.
     held : list of str
-        Inputs of the mechanism that cannot be set, and keep their values: they prescribe positions, which cannot jump,
-        or motions of a run that steps end at given times of.
+        Inputs and parameters of the mechanism that cannot be set, and keep their values: they prescribe positions,
+        which cannot jump, or motions of a run with breakpoints.
     processor : str
         What it runs on, of the first system.
     """
@@ -212,7 +212,7 @@ def export(
             }
             libraries = dict.fromkeys(made, write_fmu(folder / f"{stem}.fmu", described, version, places))
     units = {key: number.unit for key, number in numbers.items()}
-    held = [key for key, number in begun.problem.numbers.items() if number.kind == INPUT and key not in numbers]
+    held = [key for key in begun.problem.numbers if key not in numbers]
     outputs_told = {one.name: one.unit for one in told}
     first = next(iter(libraries))
     return Exported(folder, libraries[first], libraries, units, outputs_told, left, held, processors[first])
@@ -380,5 +380,10 @@ def _compile(
     ]
     done = subprocess.run(run, cwd=room, capture_output=True, text=True)
     if done.returncode:
+        if missing := sorted(set(re.findall(r"undefined (?:reference to|symbol:) [`']?([\w.$]+)", done.stderr))):
+            raise ModelError(
+                f"functions of one's own call {', '.join(missing)}, which numba takes from Python or numpy and a "
+                "library has not; write what they do (sorting, gamma, complex powers, products of matrices) in loops"
+            )
         raise ModelError(f"compiler: {' '.join(command)} could not link the library: {done.stderr.strip()[:2000]}")
     return library

@@ -162,7 +162,7 @@ def export(
         for what, named in (("set", made.numbers), ("told", made.outputs)):
             typer.echo(f"can be {what}: {len(named)}")
         if made.held:
-            typer.echo(f"note: inputs that prescribe motions keep their values: {', '.join(made.held)}", err=True)
+            typer.echo(f"note: these prescribe motions and keep their values: {', '.join(made.held)}", err=True)
         if made.left_out:
             typer.echo(f"note: left out, which a library does not tell: {', '.join(made.left_out)}", err=True)
         for library in dict.fromkeys(made.libraries.values()):

@@ -109,12 +109,28 @@ def test_functions_of_python_are_refused_by_name(tmp_path):
     assert instance.outputs()[0] == sim.get("output", "speed")
 
 
+@numba.njit
+def of_gamma(t, frames, states, parameters, wrench, rates, diagnostics):
+    """A function that numba has in Python's part."""
+    wrench[0, 5] = math.gamma(3.0 + frames[0, 0])
+
+
+def test_what_a_library_has_not_is_named(tmp_path):
+    m, body = disc()
+    m.force("own", of_gamma, body.marker(name="centre"), diagnostics=["torque"])
+    with pytest.raises(ModelError, match=says("numba_gamma", "library", "loops")):
+        export(m, tmp_path, t_end=1.0, processor="native")
+
+
 def test_inputs_that_prescribe_positions_are_told(tmp_path):
     """They cannot jump and keep their values; a speed by a coupling to the input can be set: J w' = c (input - w)."""
     m, _ = disc()
     m.rotation("motor", m.joints["pin"], m.input("angle", "rad", 0.0))
+    m.parameter("rate", "rad/s", 0.0)
+    other = m.body("other", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    m.rotation("turn", m.revolute("other pin", other, m.ground, axis=(0, 0, 1)), "rate*TIME")
     made = export(m, tmp_path, t_end=1.0, processor="native")
-    assert (made.held, list(made.numbers)) == (["angle"], ["load"])
+    assert (sorted(made.held), list(made.numbers)) == (["angle", "rate"], ["load"])
     instance = Instance(Library(made.library))
     instance.set("load", 5.0)
     instance.advance(0.5)

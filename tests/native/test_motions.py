@@ -7,6 +7,7 @@ import pytest
 
 import gearmbs as gm
 from gearmbs.native import export
+from tests.mechanism.test_stepping import slider_crank
 from tests.native.support import Instance, Library
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
@@ -63,6 +64,25 @@ def test_motions_are_set_as_in_python(level, begun, tmp_path):
     result = sim.solution().result
     np.testing.assert_array_equal(told, np.stack([result.y, result.yp], axis=1)[-len(told) :])
     assert instance.library.steps(instance.address) == result.stats.steps
+
+
+def test_a_mechanism_with_states_and_turns_starts_afresh(tmp_path):
+    """A crank at a speed that jumps, with states that equations determine: random numbers, also before the start."""
+    m = slider_crank()
+    m.rotation("motor", m.joints["main"], m.input("turning", "rad/s", 3.0), level="velocity")
+    made = export(m, tmp_path, t_end=1.0, processor="native")
+    rng, instance, sim = np.random.default_rng(3), Instance(Library(made.library)), gm.Simulator(m, 1.0, lump=False)
+    told = []
+    for t in np.cumsum(rng.uniform(1e-3, 0.03, 40)).tolist():
+        for name, value in (("turning", rng.normal(3.0, 2.0)), ("coil.stiffness", rng.uniform(0.1, 1.0))):
+            if not told or rng.random() < 0.3:
+                instance.set(name, value)
+                sim.set(name, value)
+        instance.advance(t)
+        sim.advance(t)
+        told.append(instance.unknowns())
+    result = sim.solution().result
+    np.testing.assert_array_equal(told, np.stack([result.y, result.yp], axis=1)[1:])
 
 
 def test_states_are_those_of_instances_that_start_afresh(tmp_path):
