@@ -271,4 +271,6 @@ def _asked(finder: Finder, named: Any, item: Any) -> Told:
     made = named[item]
     if made.text is not None:
         return finder.evaluate(item, made.text)
+    if made.what[0] == "evaluate":
+        return finder.evaluate(item, str(made.what[1]))
     return finder.find(item, made.what)

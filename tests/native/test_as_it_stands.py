@@ -21,6 +21,17 @@ def disc():
     return m
 
 
+def test_an_output_may_be_a_quantity_that_is_an_expression(tmp_path):
+    m = disc()
+    m.output("shown", ("evaluate", "300 + WZ(pin.I, pin.J)"))
+    made = export(m, tmp_path, t_end=1.0, processor="native")
+    assert (list(made.outputs), made.left_out) == (["speed", "shown"], [])
+    instance = Instance(Library(made.library))
+    instance.set("load", 4.0)
+    instance.advance(0.5)
+    assert instance.get("shown") == 300.0 + instance.get("speed")
+
+
 @pytest.mark.parametrize("from_state", [False, True])
 def test_a_line_that_has_ended_is_held(from_state, tmp_path):
     """2 N m until 0.5 s, evenly to 6 until 0.75 s, and 6 from there on: 2 w = 1 + 1 + 6 (t - 0.75)."""
