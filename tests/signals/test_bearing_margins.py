@@ -11,7 +11,7 @@ import pytest
 from gearmbs.bearings import Bearing, Spall
 from gearmbs.signals import SignalError, bearing_lines, combine_bearings, convert, diagnose_bearing, make_signal
 from gearmbs.signals.diagnosis.bearing_judgement import Evidence, Judged, chances_at, find_lines
-from gearmbs.signals.diagnosis.bearing_margins import agreed, answers_at, verdicts_of
+from gearmbs.signals.diagnosis.bearing_margins import agreed, answers_at, own_level, verdicts_of
 from gearmbs.signals.diagnosis.bearing_speed import ShaftSpeed, far_shaft, find_shaft
 from gearmbs.signals.diagnosis.bearings import channel_spectrum
 from gearmbs.studies import bearing_rig, housing_signal
@@ -472,6 +472,90 @@ def test_blows_as_quiet_as_that_accuse_where_their_own_lines_are_not_there():
     slow = sum(0.05 / k * np.cos(2 * np.pi * k * LINES.bpfo * SHAFT * TIME + k) for k in (1, 2, 3))
     assert diagnose_bearing(record(blows, noise=1e-5), "6205", rpm(0.0)).fault == "outer race"
     assert diagnose_bearing(record(blows, slow, noise=1e-5), "6205", rpm(0.0)).fault is None
+
+
+FIRST = LINES.bpfo * SHAFT
+SHORT = TIME[: int(RATE)]
+
+
+def slow_lines(*amplitudes, places=(1, 2, 3, 4, 5), time=SHORT):
+    """Lines at multiples of the outer race's rate, noise far below."""
+    noise = 1e-4 * np.random.default_rng(3).standard_normal(time.size)
+    lines = (a * np.cos(2 * np.pi * k * FIRST * time + k) for k, a in zip(places, amplitudes, strict=False))
+    return noise + sum(lines)
+
+
+def level_of(values):
+    return own_level(values, RATE, FIRST, (SHAFT,))
+
+
+def test_lines_of_stiffness_count_by_their_rms():
+    """A Hann window lowers a line half-way between two of the spectrum by 1.42 dB, to 0.85."""
+    falling = (0.3, 0.1, 0.2, 0.05, 0.1)
+    true = np.sqrt(0.5 * np.sum(np.square(falling)))
+    assert 0.85 * true < level_of(slow_lines(*falling)) < 1.01 * true
+
+
+@pytest.mark.parametrize("other", [18 * SHAFT, 5 * FIRST + 2.5])
+def test_a_line_two_lines_beside_the_fifth_is_no_stiffness(other):
+    """A mesh of 18 teeth, 522 Hz, stands 2.2 lines of a second beside five times the outer race."""
+    own = slow_lines(0.3, 0.1, 0.2)
+    beside = own + 5.0 * np.cos(2 * np.pi * other * SHORT)
+    assert level_of(beside) == pytest.approx(level_of(own), rel=0.05)
+    assert level_of(beside - own + slow_lines()) == 0.0
+
+
+def test_one_or_two_lines_are_no_stiffness():
+    assert level_of(slow_lines(1.0)) == 0.0
+    assert level_of(slow_lines(1.0, 0.5)) == 0.0
+    assert level_of(slow_lines(1.0, 0.5, 0.5, places=(2, 3, 4))) == 0.0
+    assert level_of(slow_lines(1.0, 0.5, 0.5)) > 0.0
+
+
+@pytest.mark.parametrize("place", [1, 3, 5])
+def test_a_stronger_line_at_the_very_place_counts_as_stiffness_may_make_it(place):
+    """0.1, 0.05, 0.05: the first is at most three times the next, and none is more than the first."""
+    alone = slow_lines(0.1, 0.05, 0.05)
+    most = np.sqrt(0.5 * (max(0.1, 3 * 0.05) ** 2 + 2 * max(0.1, 0.05) ** 2))
+    assert level_of(alone + 5.0 * np.cos(2 * np.pi * place * FIRST * SHORT)) < 1.01 * most
+
+
+def test_orders_of_the_shaft_are_no_stiffness():
+    """18 turns stand 0.07 turns beside five times the outer race, others up to half a turn beside the first four."""
+    orders = slow_lines() + sum(np.cos(2 * np.pi * m * SHAFT * SHORT + m) for m in range(1, 40))
+    assert level_of(orders) == 0.0
+
+
+def blows_of(level, seconds):
+    """Blows of an outer race that modulate so much, m/s^2 RMS, with noise of a fifth."""
+    keep = slice(round(seconds * RATE))
+    blows = pulses(FIRST)[keep]
+    blows *= level / np.sqrt(np.mean(blows**2))
+    return blows + 0.2 * level * np.random.default_rng(4).standard_normal(blows.size)
+
+
+@pytest.mark.parametrize(("level", "mesh"), [(0.9, 0.5), (0.3, 0.5)])
+def test_a_mesh_line_beside_a_line_of_the_outer_race_acquits_none(level, mesh):
+    x = blows_of(level, 1.0) + mesh * np.sqrt(2) * np.cos(2 * np.pi * 18 * SHAFT * SHORT + 1.0)
+    report = diagnose_bearing(make_signal(x, RATE, units="m/s^2"), "6205", rpm(0.0), shafts=())
+    assert report.fault == "outer race"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mains", [1.0, 3.0])
+def test_the_mains_at_a_line_of_the_outer_race_acquit_none(mains):
+    """Of a speed at which one or three times the outer race is 100 or 300 Hz."""
+    x = blows_of(0.3, 5.0) + 0.7 * np.cos(2 * np.pi * mains * FIRST * TIME)
+    report = diagnose_bearing(make_signal(x, RATE, units="m/s^2"), "6205", rpm(0.0), shafts=())
+    assert report.fault == "outer race"
+
+
+@pytest.mark.slow
+def test_blows_of_nearly_1_accuse_beside_five_lines_of_stiffness():
+    """0.9 m/s^2 is five times what any sound bearing was found to make, whatever its own lines are."""
+    x = blows_of(0.9, 5.0) + slow_lines(*[0.19] * 5, time=TIME)
+    report = diagnose_bearing(make_signal(x, RATE, units="m/s^2"), "6205", rpm(0.0), shafts=())
+    assert report.fault == "outer race"
 
 
 def coupling(speed, jaws=3, seconds=5.0):

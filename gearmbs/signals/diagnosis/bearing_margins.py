@@ -17,7 +17,9 @@ rig of 3 kg at 600 to 3600 rpm and 200 to 2500 N; docs/howto/bearings.md). The l
 accelerometers resolve, some 3e-3 m/s^2. Across the load and under heavy ones a sound bearing makes up to 0.17 m/s^2
 (6305, 6308, 300 to 1800 rpm, a fifth of C), where the slow motion meets a mode of the housing; but then its own line
 and the next four are there as well: the modulated part is 0.3 to 3.1 times these, with spalls 20 to 800 times along the
-load, and in public recordings of outer races 2.7 times and more, all of them above 1.8 m/s^2.
+load, and in public recordings of outer races 2.7 times and more, all of them above 1.8 m/s^2. Only lines that stand
+alone count, the first of them and two more at least, and none for more than the first: a mesh, the mains or an order
+of the shaft at one of these places is no stiffness.
 """
 
 from __future__ import annotations
@@ -47,9 +49,13 @@ CARRIERS = 20.0
 """Carriers above so many times a line show blows; below, smooth motions have lines, too."""
 LEAST_LEVEL = 0.03
 """m/s^2 RMS of the part of the carriers that a line modulates, from which it accuses."""
-STIFFNESS, OF_OWN, OWN_LINES = 1.0, 4.0, 5
+STIFFNESS, OF_OWN, OWN_LINES = 0.5, 4.0, 5
 """m/s^2 RMS below which lines of an outer race accuse only from so many times the RMS of the first of its lines in the
 record itself on: those are what the stiffness that varies makes."""
+LEAST_OWN, FALL = 3, 3.0
+"""Of these lines the first and so many in all must stand alone, and the first counts for so many times the next at
+most. Where stiffness made them (6205, 6208, 6305, 6308, 300 to 1800 rpm), all five stood, and the first was 1.1 to 1.5
+times the highest of the others."""
 STANDS, BESIDE = 4.0, 30
 """Medians of the lines beside it from which a line of an envelope stands: of noise alone the largest of three is as
 high, sqrt(log2(3/p)), with the probability p of 5e-5; and how many lines to either side these are."""
@@ -286,20 +292,67 @@ def carriers_from(line: float, top: float) -> float:
     return min(CARRIERS * line, 0.5 * top)
 
 
-def own_level(values: np.ndarray, rate: float, line: float) -> float:
-    """Return the RMS of a line and the next four in a record itself, in its units.
+def own_level(values: np.ndarray, rate: float, line: float, turns: Sequence[float] = ()) -> float:
+    """Return the RMS of what the stiffness that varies may make of a line and the next four in a record itself.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
     rate, line : float
         Hz.
+    turns : sequence of float
+        Of the machine's shafts, Hz.
+
+    Returns
+    -------
+    float
+        In the units of the record; 0 unless the first line and two more stand alone, see `own_lines`. None counts for
+        more than the first, and the first for no more than three times the next, as it is where stiffness makes them:
+        what stands higher is a mesh, the mains or another shaft at the same place.
+    """
+    heights = own_lines(values, rate, line, turns)
+    if heights[0] == 0.0 or np.count_nonzero(heights) < LEAST_OWN:
+        return 0.0
+    first = min(float(heights[0]), FALL * float(heights[1:].max()))
+    return math.sqrt(0.5 * float(np.sum(np.minimum(heights, first) ** 2)))
+
+
+def own_lines(values: np.ndarray, rate: float, line: float, turns: Sequence[float] = ()) -> np.ndarray:
+    """Return the amplitudes of a line and the next four in a record itself, 0 of those that do not stand alone.
+
+    A line stands alone if it is higher than the lines of noise beside it, if its top lies within a line of the
+    spectrum of its place, which the flank of another's does not, and if it is no nearer to whole turns of a shaft.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    rate, line : float
+        Hz.
+    turns : sequence of float
+        Hz.
     """
     n = values.size
     window = np.hanning(n)
     height = 2.0 * np.abs(scipy.fft.rfft((values - values.mean()) * window)) / window.sum()
-    places = [round(k * line * n / rate) for k in range(1, OWN_LINES + 1)]
-    return math.sqrt(0.5 * sum(float(height[max(p - 1, 0) : p + 2].max(initial=0.0)) ** 2 for p in places))
+    found = np.zeros(OWN_LINES)
+    for k in range(OWN_LINES):
+        place = (k + 1) * line * n / rate
+        low = max(round(place) - 1, 1)
+        near = height[low : low + 3]
+        if low + 3 >= height.size:
+            break
+        top = low + int(np.argmax(near))
+        a, b, c = height[top - 1 : top + 2]
+        beside = height[max(2, top - BESIDE) : top + BESIDE + 1]
+        if b < max(a, c) or b < STANDS * float(np.median(beside)):
+            continue
+        # two lines of a Hann window give the place between them, shifted by (2 r - 1) / (r + 1) with their ratio r
+        side, step = (c, 1.0) if c > a else (a, -1.0)
+        at = top + step * max((2.0 * side - b) / (side + b), 0.0)
+        steps = [turn * n / rate for turn in turns]
+        if all(abs(at - place) <= abs(at - step * round(at / step)) for step in steps):
+            found[k] = b
+    return found
 
 
 def modulated_level(

@@ -470,7 +470,7 @@ def _finding(
     loud = grade in (CLEAR, SIGNS, SHIFTED)
     # of a rate that is told too high, lines and bands are as much wider apart
     widest = highest * max(1.0, evidence.found / evidence.kinematic)
-    modulated, own = _modulated(signal, evidence.found, widest) if loud else (math.nan, math.nan)
+    modulated, own = _modulated(signal, evidence.found, widest, turns) if loud else (math.nan, math.nan)
     smooth = part == OUTER and modulated < STIFFNESS * level / LEAST_LEVEL and modulated < OF_OWN * own
     if modulated < level or smooth:
         grade = QUIET
@@ -484,8 +484,10 @@ def _finding(
     )  # fmt: skip
 
 
-def _modulated(signal: xr.DataArray, line: float, highest: float) -> tuple[float, float]:
+def _modulated(signal: xr.DataArray, line: float, highest: float, turns: Sequence[float]) -> tuple[float, float]:
     """Return the level that a line modulates and that of the line and the next ones, m/s^2; NaN for what is no motion.
+
+    Of the line and the next ones those near whole turns of a shaft, in Hz, are left out.
 
     Velocities and displacements are differentiated, and so is their noise: of these only lines count that stand in it.
     """
@@ -498,11 +500,12 @@ def _modulated(signal: xr.DataArray, line: float, highest: float) -> tuple[float
     rate = rate_of(signal)
     top = EDGE * rate / 2
     if motion := dimension != "acceleration":
-        own = own_level(convert(signal, "acceleration", band=(0.5 * line, top), edges="keep").values[:, 0], rate, line)
+        slow = convert(signal, "acceleration", band=(0.5 * line, top), edges="keep")
+        own = own_level(slow.values[:, 0], rate, line, turns)
         low = 0.5 * carriers_from(line, top)
         signal, factor = convert(signal, "acceleration", band=(low, top), edges="keep"), 1.0
     else:
-        own = factor * own_level(signal.values[:, 0], rate, line)
+        own = factor * own_level(signal.values[:, 0], rate, line, turns)
     bands = lambda values, limits: _narrow_bands(values, rate, limits, highest)  # noqa: E731
     return factor * modulated_level(signal.values[:, 0], rate, line, bands, top, standing=motion), own
 
