@@ -1,5 +1,6 @@
 """Tachos whose edges scatter, and pulses too many or missing where a record begins or ends."""
 
+import re
 import warnings
 
 import numpy as np
@@ -24,12 +25,12 @@ def record(turns, tacho):
     return make_signal({"a": 2.0 * np.cos(mesh) + 0.6 * np.cos(2 * mesh + 1.0) + 0.1 * noise, "tacho": tacho}, RATE)
 
 
-def analysed(turns, tacho):
+def analysed(turns, tacho, per_rev=1):
     """The first mesh lines over the angle, RMS, the mean speed in rpm, and the remarks."""
     notes = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        shaft, left = mesh_shaft(record(turns, tacho), (TEETH,), Known(tacho="tacho"), notes)
+        shaft, left = mesh_shaft(record(turns, tacho), (TEETH,), Known(tacho="tacho", pulses_per_rev=per_rev), notes)
     phase = shaft.phase
     part = left.sel(time=phase["time"], channel="a").values
     weight = np.gradient(phase.values) * (1.0 - np.cos(TURN * (phase.values - phase.values[0]) / np.ptp(phase.values)))
@@ -75,6 +76,26 @@ def test_edges_that_do_not_scatter_are_taken_as_they_are():
     lines, _, notes = analysed(SWAYING, np.cos(TURN * SWAYING))
     assert lines == pytest.approx(LINES, rel=0.01)
     assert "scatter" not in notes
+
+
+def swinging(hertz, radians=0.05):
+    return STEADY + radians / TURN * np.sin(TURN * hertz * TIME)
+
+
+def test_a_shaft_that_swings_between_sparse_pulses_is_told_by_what_stands_beside_the_mesh():
+    """Edges of every fifth turn, without any noise, see swings of 7.3 Hz as 2.3 Hz: these are no edges that scatter."""
+    turns = swinging(7.3)
+    lines, _, notes = analysed(turns, np.cos(TURN * 0.2 * turns), 0.2)
+    assert lines[0] < 0.9 * LINES[0]
+    assert re.search(says("CHECK THE SPEED", "swings between the pulses", "more pulses a turn"), notes)
+    assert "What it leaves takes" not in notes
+
+
+def test_a_shaft_that_swings_slowly_between_sparse_pulses_is_followed():
+    turns = swinging(0.7)
+    lines, _, notes = analysed(turns, np.cos(TURN * 0.2 * turns), 0.2)
+    assert lines == pytest.approx(LINES, rel=0.02)
+    assert "swings between" not in notes
 
 
 LAST = int(STEADY[-1])

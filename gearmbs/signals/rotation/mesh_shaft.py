@@ -37,6 +37,9 @@ given one is looked for."""
 SCATTERED, UNSURE = 0.1, 0.2
 """Radians of the mesh by which edges of a tacho may scatter, half a percent of the line, 4 % of its third harmonic; and
 that may be left of it, 2 % of the line."""
+SWINGS, BESIDE_MESH, FLOOR_FROM = 0.05, 0.75, 2.5
+"""Part of the mesh line that what stands beside it may take before that is told; turns of the shaft to either side
+where this is looked for, short of the sidebands of whole turns; and those up to which the noise is taken."""
 LEAST_OFF = 0.05
 """The same from which an angle is calibrated: sinc of it is 0.4 % of the line."""
 MEASURED = 5e-3
@@ -124,6 +127,16 @@ def _of_scattered_edges(
     left = float(other.phase.attrs["scatter"]) * teeth
     kept = math.exp(-0.5 * left**2)
     unsure = left > UNSURE
+    if (lost := _lost_beside(signal, other, teeth)) > max(SWINGS, 1.0 - kept):
+        notes.append(
+            f"CHECK THE SPEED: the edges of the tacho {known.tacho!r} scatter by {scatter / math.tau * 100:.2g} % of a "
+            f"turn ({math.degrees(scatter * teeth):.0f} deg of the mesh); over the smoothest course through them the "
+            f"mesh line is still about {100 * lost:.2g} % lower than together with what stands within {BESIDE_MESH:g} "
+            "turns beside it, and its harmonics more: the shaft swings between the pulses, which they do not show. "
+            "Look at the levels in bands, take more pulses a turn, or the speed alone (speed=), near which the mesh "
+            "line is then followed."
+        )
+        return other
     notes.append(
         f"{'CHECK THE SPEED: ' if unsure else ''}The edges of the tacho {known.tacho!r} scatter by "
         f"{scatter / math.tau * 100:.2g} % of a turn ({math.degrees(scatter * teeth):.0f} deg of the mesh), which is "
@@ -149,6 +162,26 @@ def _mesh_power(signal: xr.DataArray, shaft: Shaft, teeth: int) -> float:
     weight = np.hanning(angle.size)[:, None] * part
     lines = [np.abs(np.exp(-1j * teeth * k * angle) @ weight) ** 2 for k in range(1, HARMONICS + 1)]
     return float(np.sum(np.sum(lines, axis=0) / np.maximum(np.sum(part**2, axis=0), 1e-300)))
+
+
+def _lost_beside(signal: xr.DataArray, shaft: Shaft, teeth: int) -> float:
+    """Return the share by which a mesh line over an angle is lower than with what stands close beside it, above noise.
+
+    Of the channel in which the mesh is the largest part. An angle that does not follow the shaft spreads the line so.
+    """
+    over = _over_angle(signal, shaft, teeth)
+    values = over.values - over.values.mean(axis=0)
+    power = np.abs(np.fft.rfft(np.hanning(len(values))[:, None] * values, axis=0)) ** 2
+    step = rate_of(over) / len(values) / (shaft.speed / math.tau)
+    away = np.abs(np.arange(len(power)) * step - teeth)
+    line = power[away <= LINES_OFF * step].sum(axis=0)
+    best = int(np.argmax(line / np.maximum(power.sum(axis=0), 1e-300)))
+    near, floor = (away > LINES_OFF * step) & (away < BESIDE_MESH), (away >= BESIDE_MESH) & (away < FLOOR_FROM)
+    if not near.any() or line[best] == 0.0:
+        return 0.0
+    noise = float(np.median(power[floor, best])) / math.log(2.0)
+    beside = max(float(power[near, best].sum()) - noise * np.count_nonzero(near), 0.0)
+    return 1.0 - math.sqrt(float(line[best]) / (float(line[best]) + beside))
 
 
 def compare_with_mesh(
