@@ -98,6 +98,30 @@ def test_a_shaft_that_swings_slowly_between_sparse_pulses_is_followed():
     assert "swings between" not in notes
 
 
+SWINGS = {
+    "hunting, one pulse": (swinging(2.3, 0.15), 1),
+    "a joint of 20 degrees, 16 pulses": (STEADY + 0.031 / TURN * np.sin(TURN * 2.0 * STEADY), 16),
+    "a misfire, 16 pulses": (STEADY + 0.05 / TURN * np.sin(TURN * 0.5 * STEADY), 16),
+}
+
+
+@pytest.mark.parametrize("case", SWINGS)
+def test_a_mesh_line_that_stands_over_the_angle_of_a_tacho_contradicts_none(case):
+    """Over time the swings spread it into sidebands: 3.4 rad of the mesh leave less at its own place than beside it."""
+    turns, per_rev = SWINGS[case]
+    lines, speed, notes = analysed(turns, np.cos(TURN * per_rev * turns), per_rev)
+    assert lines == pytest.approx(LINES, rel=0.03)
+    assert speed == pytest.approx(1500.0, rel=1e-3)
+    assert "CHECK" not in notes
+
+
+@pytest.mark.parametrize("case", SWINGS)
+def test_a_tacho_that_turns_at_another_speed_is_contradicted_though_the_shaft_swings(case):
+    turns, per_rev = SWINGS[case]
+    _, _, notes = analysed(turns, np.cos(TURN * per_rev * 1.014 * turns), per_rev)
+    assert "CHECK THE SPEED" in notes
+
+
 LAST = int(STEADY[-1])
 ENDS = {
     "one too many in the first turn": {"extra": [1.2]},

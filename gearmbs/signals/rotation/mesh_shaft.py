@@ -93,7 +93,7 @@ def mesh_shaft(
             over = _over_angle(signal, shaft, teeth[0])
             notes += remark_spread(over, shaft.speed, teeth[0], shaft.origin)
         if found.range is None and not found.integrated:
-            compare_with_mesh(signal, teeth, shaft, notes)
+            notes += _unlike_mesh(signal, teeth, shaft)
     else:
         estimate = followed_comb(signal, teeth, known.speed_range)
         if estimate.doubt:
@@ -182,6 +182,20 @@ def _lost_beside(signal: xr.DataArray, shaft: Shaft, teeth: int) -> float:
     noise = float(np.median(power[floor, best])) / math.log(2.0)
     beside = max(float(power[near, best].sum()) - noise * np.count_nonzero(near), 0.0)
     return 1.0 - math.sqrt(float(line[best]) / (float(line[best]) + beside))
+
+
+def _unlike_mesh(signal: xr.DataArray, counts: tuple[int, ...], shaft: Shaft) -> list[str]:
+    """Say so where the mesh line contradicts a speed, of a tacho only if it does so over its angle, too.
+
+    A shaft that swings spreads its mesh over time into sidebands higher than itself.
+    """
+    notes: list[str] = []
+    compare_with_mesh(signal, counts, shaft, notes)
+    if not notes or not shaft.tacho:
+        return notes
+    over: list[str] = []
+    found = compare_with_mesh(_over_angle(signal, shaft, counts[0]), counts, shaft, over)
+    return notes if over or found is None else []
 
 
 def compare_with_mesh(
