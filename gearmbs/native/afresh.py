@@ -96,7 +96,19 @@ def _factors_with_plan(functions, st, plan, factors, d, a, h):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _choose(functions, st, plan, factors, d, room, columns, rows_left, a, h):
-    """Factor the matrix of a first step of size ``h``; return 0 or a failure."""
+    """Factor the matrix of a first step of size ``h``; return 0 or a failure.
+
+    Parameters
+    ----------
+    functions, st, plan, factors
+        As of `gearmbs.dae.integrators.step`'s kernels: the problem's functions, the run, its pivots and their numbers.
+    d, a : structures
+        The driver of the library and what it holds for runs that start afresh.
+    room, columns, rows_left : ndarray
+        Scratch of the search for pivots.
+    h : float
+        Size of the step, s.
+    """
     if a.planned_step == h and _factors_with_plan(functions, st, plan, factors, d, a, h):
         return 0
     _evaluate_matrix(functions, st, h)
@@ -123,7 +135,19 @@ def _correction(st, plan, factors, d):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _repair(functions, st, plan, factors, d, room, columns, rows_left, a, h):
-    """Move the values onto the constraints over a vanishing step, where they are off; return 0 or a failure."""
+    """Move the values onto the constraints over a vanishing step, where they are off; return 0 or a failure.
+
+    Parameters
+    ----------
+    functions, st, plan, factors
+        As of `gearmbs.dae.integrators.step`'s kernels: the problem's functions, the run, its pivots and their numbers.
+    d, a : structures
+        The driver of the library and what it holds for runs that start afresh.
+    room, columns, rows_left : ndarray
+        Scratch of the search for pivots.
+    h : float
+        Size of the step, s.
+    """
     n = st.y.shape[0]
     move = _correction(st, plan, factors, d)
     for _ in range(start.CHECK_ROUNDS):
@@ -189,7 +213,17 @@ def _euler_error(functions, st, plan, factors, d, h):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_first_step(functions, st, plan, factors, d, room, columns, rows_left, a):
-    """Choose the first step and its pivots; return 0 or a failure."""
+    """Choose the first step and its pivots; return 0 or a failure.
+
+    Parameters
+    ----------
+    functions, st, plan, factors
+        As of `gearmbs.dae.integrators.step`'s kernels: the problem's functions, the run, its pivots and their numbers.
+    d, a : structures
+        The driver of the library and what it holds for runs that start afresh.
+    room, columns, rows_left : ndarray
+        Scratch of the search for pivots.
+    """
     least = st.h
     h = 0.0 if a.first_given else min(start.FIRST_TRIED * (st.t_end - st.t), st.h_max)
     for _ in range(start.TRIALS):
