@@ -48,7 +48,7 @@ from gearmbs.dae.equations.rotation import KIN_A, KIN_FORCE, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed, put
 from gearmbs.dae.problem import HOOK_SIG, JACOBIAN_SIG, KEPT, RESIDUAL_SIG
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.structs import matrix_at, vector_at
+from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 AXIS_OMEGA = 0
 """Index in y of the angular velocity, -1 where a motion prescribes the turn."""
@@ -84,7 +84,7 @@ COUNTS = 4
 unknowns of the last evaluation and, behind them, the slopes of the wrenches, see `keep_slopes`, -1 for nowhere."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def axes_in(idata, rdata):
     """Return the views of the lean elements, axes, markers looked at, slots, and of the axes' reals."""
     end = idata.size - COUNTS
@@ -99,7 +99,7 @@ def axes_in(idata, rdata):
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def turn_of(k, y, axes, turns, fval):
     """Return phi and omega of body k + 1 at the unknowns y, or where its motion has it."""
     if axes[k, AXIS_PHI] >= 0:
@@ -108,7 +108,7 @@ def turn_of(k, y, axes, turns, fval):
     return turn[TURN_SENSE] * (fval[function, 0] - turn[TURN_START]), turn[TURN_SENSE] * fval[function, 1]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def turn_body(k, y, axes, turns, fval, kin):
     """Fill the kinematics of body k + 1 at the unknowns y, or where its motion has it."""
     turn, row = turns[k], kin[k + 1]
@@ -128,7 +128,7 @@ def turn_body(k, y, axes, turns, fval, kin):
         row[KIN_R + q] += turn[TURN_POINT + q]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def keep_unknowns(y, idata, work):
     """Keep the unknowns of an evaluation for whoever reads what it leaves in the work array."""
     kept = idata[idata.size - 1]
@@ -137,7 +137,7 @@ def keep_unknowns(y, idata, work):
             work[kept + i] = y[i]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_axes(t, y, axes, markers, turns, tab, every):
     """Bring functions of time, bodies, the markers looked at and expected angles up to date with t and y.
 
@@ -156,7 +156,7 @@ def update_axes(t, y, axes, markers, turns, tab, every):
     predict_angles(t, tab)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def lever(k, marker, turns, tab, s):
     """Write n x (P - C) for the origin P of a marker and the axis of body k + 1 to ``s[3:6]``; ``s[0:3]`` is used."""
     body = tab.kin[tab.marker_body[marker]]
@@ -166,7 +166,7 @@ def lever(k, marker, turns, tab, s):
     cross3(turns[k], TURN_AXIS, s, 0, s, 3)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def weight_moment(k, axes, turns, tab, s):
     """Return the moment of the weight of body k + 1 about its axis, and its derivative by the angle."""
     turn, body = turns[k], tab.kin[k + 1]
@@ -181,7 +181,7 @@ def weight_moment(k, axes, turns, tab, s):
     return turn[TURN_MASS] * dot3(s, 3, tab.gravity, 0), turn[TURN_MASS] * dot3(s, 6, tab.gravity, 0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_moments(row, wrench, axes, turns, tab):
     """Add the moments of a force element about the axes to what is collected; J's body feels the opposite."""
     s = vector_at(tab.scratch, S_VECTOR, 9)
@@ -198,7 +198,7 @@ def add_moments(row, wrench, axes, turns, tab):
         tab.kin[k + 1, KIN_FORCE] += moment if side == 0 else -moment
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def put_turns(row, y, axes, turns, tab):
     """Leave the angles of the two bodies of an element and their rates where `evaluate_lean` looks for them."""
     for side in range(2):
@@ -207,7 +207,7 @@ def put_turns(row, y, axes, turns, tab):
         tab.scratch[S_TURNS + side], tab.scratch[S_TURNS + 2 + side] = phi, omega
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_lean_moments(row, lean, rdata, axes, turns, tab):
     """Add the moments of an element with a lean kernel about its two axes; as `add_moments`."""
     wrench = vector_at(tab.scratch, row[T.FORCE_WORK], 6)
@@ -218,9 +218,10 @@ def add_lean_moments(row, lean, rdata, axes, turns, tab):
             tab.kin[k + 1, KIN_FORCE] += moment if side == 0 else -moment
 
 
-@njit(RESIDUAL_SIG, cache=True, error_model="numpy", _nrt=False)
+@njit(RESIDUAL_SIG, cache=True, error_model="numpy")
 def axes_residual(t, y, yp, out, idata, rdata, work):
     """Evaluate the residual of bodies that turn about fixed axes into ``out``."""
+    y, yp, out, idata, rdata = uncounted(y), uncounted(yp), uncounted(out), uncounted(idata), uncounted(rdata)
     tab = T.unpack(idata, rdata, work)
     leans, axes, markers, _, turns = axes_in(idata, rdata)
     update_axes(t, y, axes, markers, turns, tab, False)
@@ -260,7 +261,7 @@ def axes_residual(t, y, yp, out, idata, rdata, work):
         out[z] = left - expressions.value(tab.state[k, T.STATE_TAPE], t, y, tab)
 
 
-@njit(HOOK_SIG, cache=True, error_model="numpy", _nrt=False)
+@njit(HOOK_SIG, cache=True, error_model="numpy")
 def axes_hook(t, hist, npast, idata, rdata, work):
     """Update the reference of each counted angle; coordinates never change."""
     tab = T.unpack(idata, rdata, work)
@@ -288,7 +289,7 @@ S_FORCE = S_CHAIN + 9
 """(n x (P - C)) x F, by which the moment of a force changes as its point moves with its body; from 6 on six weights."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def prepare_chain(k, turns, tab, s):
     """Write rho, n x rho and n x (n x rho) of body k + 1 to ``s``."""
     for c in range(3):
@@ -297,7 +298,7 @@ def prepare_chain(k, turns, tab, s):
     cross3(turns[k], TURN_AXIS, s, 3, s, 6)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def chain(k, omega, d, at, turns, s):
     """Return the derivatives by phi and omega of body k + 1 from the spatial ones in ``d[at:]``."""
     n = turns[k]
@@ -306,7 +307,7 @@ def chain(k, omega, d, at, turns, s):
     return by_phi, dot3(d, at + 6, s, 3) + dot3(d, at + 9, n, TURN_AXIS)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def weighted_entries(mode, base, rows, weights, bodies, first, unknowns, after, y, axes, turns, tab, slot, vals, k):
     """Entries of one equation from minus a weighted sum of rows of spatial derivatives.
 
@@ -350,7 +351,7 @@ def weighted_entries(mode, base, rows, weights, bodies, first, unknowns, after, 
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k):
     """Entries of the moments of one force element about the axes of its bodies.
 
@@ -399,7 +400,7 @@ def moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k):
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def element_axis_entries(mode, t, row, y, cj, idata, axes, turns, tab, slot, vals, k):
     """Entries of one force element: of its own states, and of its moments about the axes.
 
@@ -438,7 +439,7 @@ def element_axis_entries(mode, t, row, y, cj, idata, axes, turns, tab, slot, val
     return moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def keep_slopes(f, y, idata, axes, turns, tab, work):
     """Keep the derivatives of a compiled element's wrench by the unknowns, six rows of them behind the unknowns kept.
 
@@ -479,7 +480,7 @@ def keep_slopes(f, y, idata, axes, turns, tab, work):
             slopes[r, tab.extra_i[after + q]] += rows[r, 12 * bodies + q]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def lean_entries(mode, f, lean, y, idata, rdata, axes, turns, tab, slot, vals, k, work):
     """Entries of the moments of an element with a lean kernel; keeps the slopes of its wrench as `keep_slopes` does.
 
@@ -522,7 +523,7 @@ def lean_entries(mode, f, lean, y, idata, rdata, axes, turns, tab, slot, vals, k
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def axis_state_entries(mode, t, state, y, cj, idata, axes, turns, tab, slot, vals, k):
     """Entries of the equation of one user-defined state that an expression gives.
 
@@ -552,9 +553,10 @@ def axis_state_entries(mode, t, state, y, cj, idata, axes, turns, tab, slot, val
     )  # fmt: skip
 
 
-@njit(JACOBIAN_SIG, cache=True, error_model="numpy", _nrt=False)
+@njit(JACOBIAN_SIG, cache=True, error_model="numpy")
 def axes_jacobian(t, y, yp, cj, vals, idata, rdata, work):
     """Evaluate dG/dy + cj dG/dy' into ``vals``, or count the entries or note their places; see `unknowns.put`."""
+    y, vals, idata, rdata = uncounted(y), uncounted(vals), uncounted(idata), uncounted(rdata)
     tab = T.unpack(idata, rdata, work)
     leans, axes, markers, slot, turns = axes_in(idata, rdata)
     mode = idata[T.H_MODE]

@@ -17,10 +17,10 @@ from gearmbs.dae.equations.residual import S_TERM
 from gearmbs.dae.equations.unknowns import COUNT, NUMBERS, PLACES, compressed
 from gearmbs.dae.problem import JACOBIAN_SIG
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.structs import vector_at
+from gearmbs.kernels.structs import uncounted, vector_at
 
 
-@njit(JACOBIAN_SIG, cache=True, error_model="numpy", _nrt=False)
+@njit(JACOBIAN_SIG, cache=True, error_model="numpy")
 def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     """Evaluate dG/dy + cj dG/dy' into ``vals``, CSC order.
 
@@ -39,6 +39,7 @@ def jacobian(t, y, yp, cj, vals, idata, rdata, work):
     idata, rdata, work : ndarray
         The packed tables and the work array.
     """
+    y, yp, vals, idata = uncounted(y), uncounted(yp), uncounted(vals), uncounted(idata)
     tab = T.unpack(idata, rdata, work)
     mode = idata[T.H_MODE]
     update_tables(t, y, tab, True)

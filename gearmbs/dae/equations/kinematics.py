@@ -39,7 +39,7 @@ from gearmbs.kernels.structs import vector_at
 AXES = ("AX", "AY", "AZ")
 
 
-@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy", _nrt=False)
+@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def axes_product(first, a, second, b):
     """Return the cosine between axis ``a`` of one frame and axis ``b`` of another (rows of 18)."""
     total = 0.0
@@ -48,7 +48,7 @@ def axes_product(first, a, second, b):
     return total
 
 
-@njit("float64(int64, float64[::1], float64[::1], float64)", cache=True, error_model="numpy", _nrt=False)
+@njit("float64(int64, float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
 def counted_angle(axis, first, second, reference):
     """Return the turn of frame ``first`` about an axis (0, 1, 2) of ``second``, the value nearest to a reference."""
     if axis == 0:
@@ -60,7 +60,7 @@ def counted_angle(axis, first, second, reference):
     return angle + 2.0 * np.pi * np.round((reference - angle) / (2.0 * np.pi))
 
 
-@njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy", _nrt=False)
+@njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def angle_gradient(axis, first, second, out, k):
     """Write the derivative of `counted_angle` by the rotation of ``first``; that by ``second``'s is its opposite.
 
@@ -81,7 +81,7 @@ def angle_gradient(axis, first, second, out, k):
         out[k + r] = (first[FRAME_A + 3 * r1 + turned] * p2 - first[FRAME_A + 3 * r2 + turned] * p1) / size
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def predict_element_angles(past, angle, extra_r):
     """Set the references to what the last values and rates let expect after a time ``past``."""
     for k in range(angle.shape[0]):
@@ -89,7 +89,7 @@ def predict_element_angles(past, angle, extra_r):
         extra_r[at] = extra_r[at + 1] + past * extra_r[at + 2]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def track_element_angles(angle, extra_r, first, second, gradient, moving):
     """Keep the value of one angle of two frames, and its rate if ``moving``, as the last ones."""
     at = angle[T.ANGLE_AT]
@@ -106,7 +106,7 @@ TURNS_OF_TWO = 2 * LANES
 """Places for sines and cosines of the angles of two bodies."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
     """Fill the kinematics table from the positions and velocities in y.
 
@@ -136,7 +136,7 @@ def update_bodies(y, at, code, body, modal, kin, partial, scratch, derivatives):
         update_frame(f, y, at, modal, kin, partial, scratch, derivatives)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_marker(m, marker_body, marker, kin, frame):
     """Fill one row of the marker table: arm and axes in global components."""
     row, own, out = kin[marker_body[m]], marker[m], frame[m]
@@ -154,14 +154,14 @@ def update_marker(m, marker_body, marker, kin, frame):
         out[k + 2] = zx * a + zy * b + zz * c
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_markers(marker_body, marker, kin, frame):
     """Fill the marker table."""
     for m in range(marker_body.size):
         update_marker(m, marker_body, marker, kin, frame)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_functions(t, tab):
     """Evaluate every function of time with two derivatives into the function table."""
     for k in range(tab.function.shape[0]):
@@ -181,7 +181,7 @@ def update_functions(t, tab):
             tab.fval[k, 0], tab.fval[k, 1], tab.fval[k, 2] = f, f1, f2
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def predict_angles(t, tab):
     """Set the references of all counted angles to what their last values and rates let expect at time t."""
     n = tab.reference.size
@@ -196,7 +196,7 @@ def predict_angles(t, tab):
     predict_element_angles(past, tab.angle, tab.extra_r)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_tables(t, y, tab, derivatives):
     """Bring bodies, markers, functions of time and expected angles up to date with t and y; see `update_bodies`."""
     update_bodies(y, tab.at, tab.code, tab.body, tab.modal, tab.kin, tab.partial, tab.scratch, derivatives)
@@ -205,7 +205,7 @@ def update_tables(t, y, tab, derivatives):
     predict_angles(t, tab)
 
 
-@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy", _nrt=False)
+@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def euler_component(kin_row, m, v, k):
     """Return a_m . v, the component of a spatial rotation gradient along Euler angle m."""
     return dot3(kin_row, KIN_AXES + 3 * m, v, k)
@@ -218,7 +218,7 @@ def euler_component(kin_row, m, v, k):
 # momentum are the same before and after, so this is a change of coordinates and not a perturbation.
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def rewrite_point(y, b, old, new, at, kin, s):
     """Turn angles, rates and conjugate momenta of body b from one reference to the other."""
     e, th, p = at[b, T.AT_EPS], at[b, T.AT_THETA], at[b, T.AT_P]
@@ -239,7 +239,7 @@ TURN_OF_MATRIX = 0.3
 """Turn (rad) after which Newton's method with the old matrix would let deviations from the constraints grow."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def counts_angles(tab):
     """Return whether any constraint, force element or expression counts an angle."""
     if tab.angle.shape[0] > 0:
@@ -253,7 +253,7 @@ def counts_angles(tab):
     return False
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def turns_are_counted(tab):
     """Whether some angle is counted through full turns, so that `track` has something to do."""
     counted = tab.angle.shape[0] > 0
@@ -264,7 +264,7 @@ def turns_are_counted(tab):
     return counted
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def track(t, y, tab, moving):
     """Count the turns of all counted angles up to a later point, less than half a turn from where it is expected.
 
@@ -304,7 +304,7 @@ def track(t, y, tab, moving):
             tab.winding[1 + n + k] = rate if moving else 0.0
 
 
-@njit(HOOK_SIG, cache=True, error_model="numpy", _nrt=False)
+@njit(HOOK_SIG, cache=True, error_model="numpy")
 def hook(t, hist, npast, idata, rdata, work):
     """Switch references where due; update the reference of each counted angle.
 

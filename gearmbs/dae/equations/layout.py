@@ -251,7 +251,7 @@ TABLES = types.NamedTuple(
 """Type of what `unpack` returns, for the signatures of late kernels."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def unpack(idata, rdata, work):
     """Return the named views of the flat tables; nothing is copied.
 

@@ -48,7 +48,7 @@ from gearmbs.dae.equations.unknowns import has_rate_rows, multipliers_are_rates,
 from gearmbs.dae.problem import RESIDUAL_SIG
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, VEC
-from gearmbs.kernels.structs import matrix_at, vector_at
+from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 S_GRADIENT = 0
 S_GRADIENT_T = 12
@@ -59,10 +59,7 @@ S_VECTOR = 320
 
 
 @njit(
-    "void(float64, float64[::1], float64[::1], int64[::1], float64[::1], float64[::1])",
-    cache=True,
-    error_model="numpy",
-    _nrt=False,
+    "void(float64, float64[::1], float64[::1], int64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy"
 )
 def update(t, y, yp, idata, rdata, work):
     """Bring the kinematics and marker tables up to date with y."""
@@ -70,7 +67,7 @@ def update(t, y, yp, idata, rdata, work):
     update_tables(t, y, tab, True)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def arm_to(b, point_marker, marker_body, kin, frame, out, k):
     """Write the vector from body b's centre of mass to the origin of a marker, global components."""
     owner = marker_body[point_marker]
@@ -78,7 +75,7 @@ def arm_to(b, point_marker, marker_body, kin, frame, out, k):
         out[k + c] = kin[owner, KIN_R + c] + frame[point_marker, c] - kin[b, KIN_R + c]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_load(b, sign, row, y, marker_body, kin, frame, scratch):
     """Add the loads of one force element to what is collected for frame b (eq. (5), H_F^T F and H_N^T N).
 
@@ -112,7 +109,7 @@ def add_load(b, sign, row, y, marker_body, kin, frame, scratch):
             body[KIN_MOMENT + c] -= sign * y[row[T.FORCE_N] + c]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def begin_wrenches(kin):
     """Clear the columns in which the forces on frames are added up."""
     for b in range(kin.shape[0]):
@@ -120,7 +117,7 @@ def begin_wrenches(kin):
             kin[b, c] = 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_wrenches(bodies, at, modal, kin, partial, scratch, out):
     """Bring the forces added up for each frame to the coordinates: eq. (5), and mu in eq. (6)."""
     for f in range(bodies, at.shape[0]):
@@ -129,7 +126,7 @@ def add_wrenches(bodies, at, modal, kin, partial, scratch, out):
         add_wrench(at[b], kin[b], out)
 
 
-@njit(types.UniTuple(F8, 2)(I8, F8, F8, F8, VEC, T.TABLES, VEC), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(types.UniTuple(F8, 2)(I8, F8, F8, F8, VEC, T.TABLES, VEC), cache=True, late=True, error_model="numpy")
 def add_tape_row(k, t, lam, mu, y, tab, out):
     """Add the constraint forces of a row given by tape k; return its value and rate."""
     row = tab.tape[k]
@@ -156,7 +153,7 @@ def add_tape_row(k, t, lam, mu, y, tab, out):
     return value, rate
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_constraints(t, y, yp, idata, tab, out):
     """Constraint rows, their derivatives, and the constraint forces of lambda and mu."""
     rate_rows = has_rate_rows(idata[T.H_FORMULATION])
@@ -220,7 +217,7 @@ def add_constraints(t, y, yp, idata, tab, out):
             out[mu0 + r] = rate
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_own_states(row, y, yp, idata, state, scratch, out):
     """Write the equations z' - f or z - f of the states of a compiled element that has just been evaluated."""
     rates = row[T.FORCE_WORK] + 6 * row[T.FORCE_WRENCHES]
@@ -230,9 +227,10 @@ def add_own_states(row, y, yp, idata, state, scratch, out):
         out[z] = left - scratch[rates + k]
 
 
-@njit(RESIDUAL_SIG, cache=True, error_model="numpy", _nrt=False)
+@njit(RESIDUAL_SIG, cache=True, error_model="numpy")
 def residual(t, y, yp, out, idata, rdata, work):
     """Evaluate G(t, y, y') of eq. (8) into ``out``."""
+    y, yp, out, idata = uncounted(y), uncounted(yp), uncounted(out), uncounted(idata)
     tab = T.unpack(idata, rdata, work)
     update_tables(t, y, tab, False)
     begin_wrenches(tab.kin)

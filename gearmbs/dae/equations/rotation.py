@@ -55,10 +55,7 @@ SWITCH_SINE = 0.5
 
 
 @njit(
-    "void(float64, float64, float64, float64, float64, float64, float64[::1], int64)",
-    cache=True,
-    error_model="numpy",
-    _nrt=False,
+    "void(float64, float64, float64, float64, float64, float64, float64[::1], int64)", cache=True, error_model="numpy"
 )
 def cross_into(ax, ay, az, bx, by, bz, out, k):
     """Write a x b to ``out[k:]``.
@@ -77,7 +74,7 @@ def cross_into(ax, ay, az, bx, by, bz, out, k):
     out[k + 2] = ax * by - ay * bx
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def matrix_of(turn_1, turn_2, turn_3, code, out, k):
     """Write A (row-major) to ``out[k:k+9]`` from cosine and sine of each of the three angles."""
     c1, s1 = turn_1
@@ -96,13 +93,13 @@ def matrix_of(turn_1, turn_2, turn_3, code, out, k):
         out[k + 6], out[k + 7], out[k + 8] = zx, -zz, zy
 
 
-@njit("void(float64, float64, float64, int64, float64[::1], int64)", cache=True, error_model="numpy", _nrt=False)
+@njit("void(float64, float64, float64, int64, float64[::1], int64)", cache=True, error_model="numpy")
 def rotation_matrix(psi, theta, phi, code, out, k):
     """Write A (row-major) of the 3-1-3 angles and the reference code to ``out[k:k+9]``."""
     matrix_of((np.cos(psi), np.sin(psi)), (np.cos(theta), np.sin(theta)), (np.cos(phi), np.sin(phi)), code, out, k)
 
 
-@njit("void(float64[::1], int64, int64, float64[::1], int64)", cache=True, error_model="numpy", _nrt=False)
+@njit("void(float64[::1], int64, int64, float64[::1], int64)", cache=True, error_model="numpy")
 def euler_angles(a, k, code, out, j):
     """Write the 3-1-3 angles (theta in [0, pi]) of the row-major matrix ``a[k:k+9]`` to ``out[j:j+3]``."""
     if code == REFERENCE_IDENTITY:
@@ -121,7 +118,7 @@ def euler_angles(a, k, code, out, j):
         out[j + 2] = 0.0
 
 
-@njit("int64(float64[::1], int64)", cache=True, error_model="numpy", _nrt=False)
+@njit("int64(float64[::1], int64)", cache=True, error_model="numpy")
 def best_reference(a, k):
     """Return the reference code whose |sin(theta)| is the larger for the matrix ``a[k:k+9]``."""
     if abs(a[k + 8]) <= abs(a[k + 7]):
@@ -129,7 +126,7 @@ def best_reference(a, k):
     return REFERENCE_QUARTER_TURN
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def axes_of(turn_1, turn_2, e1, e2, e3, row):
     """Fill what `axes_and_velocity` does in a row of the kinematics table, from cosine and sine of psi and theta."""
     c1, s1 = turn_1
@@ -151,23 +148,13 @@ def axes_of(turn_1, turn_2, e1, e2, e3, row):
     cross_into(e2 * c1, e2 * s1, e1, row[g + 6], row[g + 7], row[g + 8], row, r + 6)
 
 
-@njit(
-    "void(float64, float64, float64, float64, float64, float64[:, ::1], int64)",
-    cache=True,
-    error_model="numpy",
-    _nrt=False,
-)
+@njit("void(float64, float64, float64, float64, float64, float64[:, ::1], int64)", cache=True, error_model="numpy")
 def axes_and_velocity(psi, theta, e1, e2, e3, kin, b):
     """Fill axes, omega, d(omega)/d(theta) and axis rates of body b in the kinematics table."""
     axes_of((np.cos(psi), np.sin(psi)), (np.cos(theta), np.sin(theta)), e1, e2, e3, kin[b])
 
 
-@njit(
-    "void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)",
-    cache=True,
-    error_model="numpy",
-    _nrt=False,
-)
+@njit("void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def euler_rates(kin, b, w, i, out, j):
     """Solve omega = sum_k a_k eps_k for the Euler rates of body b; ``w[i:i+3]`` is omega."""
     row = kin[b]
@@ -182,12 +169,7 @@ def euler_rates(kin, b, w, i, out, j):
     out[j] = wz - c2 * e3
 
 
-@njit(
-    "void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)",
-    cache=True,
-    error_model="numpy",
-    _nrt=False,
-)
+@njit("void(float64[:, ::1], int64, float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def momentum_from_conjugate(kin, b, p, i, out, j):
     """Solve p_k = a_k . h for the angular momentum h of body b."""
     row = kin[b]
@@ -284,7 +266,7 @@ COSINE = (1.0 / 24.0, -0.0013888888888887389, 2.48015872987544e-05, -2.755731726
 """(cos x - 1 + x^2/2)/x^4 likewise."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def sines_and_cosines(angles):
     """Return sines and cosines of angles in lanes, each at most `FARTHEST_ANGLE` in size."""
     turns = (angles * QUARTERS + INTEGER) - INTEGER
@@ -307,7 +289,7 @@ def sines_and_cosines(angles):
     return along * sine + across * cosine, along * cosine - across * sine
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def put_turns(y, first, second, out):
     """Write sines and cosines of two times three angles to lanes 0 and 1 of ``out``, six of the eight of each.
 

@@ -151,13 +151,13 @@ def offsets(counts: Counts, formulation: int) -> dict[str, int]:
     return at
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def has_rate_rows(formulation):
     """Whether the derivatives of the constraints are among the equations, and so mu among the unknowns."""
     return formulation != I3
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def multipliers_are_rates(formulation):
     """Whether lambda and mu are derivatives of unknowns."""
     return formulation == SI1
@@ -202,7 +202,7 @@ def places(counts: Counts, formulation: int) -> np.ndarray:
 # --- what the formulations choose, for kernels ---------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def multipliers_of_row(r, y, yp, idata):
     """Return lambda and mu of constraint row r: unknowns, or in SI1 derivatives of unknowns."""
     form = idata[T.H_FORMULATION]
@@ -214,7 +214,7 @@ def multipliers_of_row(r, y, yp, idata):
     return y[lam], y[mu]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def multiplier_factor(cj, idata):
     """Return the derivative of lambda and mu with respect to the unknown they are made from."""
     return cj if multipliers_are_rates(idata[T.H_FORMULATION]) else 1.0
@@ -363,9 +363,7 @@ def named(
 NUMBERS, PLACES, COUNT = 0, 1, 2
 
 
-@njit(
-    "int64(int64, int64[::1], float64[::1], int64, int64, int64, float64)", cache=True, error_model="numpy", _nrt=False
-)
+@njit("int64(int64, int64[::1], float64[::1], int64, int64, int64, float64)", cache=True, error_model="numpy")
 def put(mode, slot, vals, k, row, col, value):
     """Hand over entry k; return the number of the next.
 
@@ -386,21 +384,21 @@ def put(mode, slot, vals, k, row, col, value):
     return k + 1
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def put_pair(mode, slot, vals, k, row, col, value):
     """Hand over an entry of Phi_q and its mirror image in Phi_q^T; return the number of the next entry."""
     k = put(mode, slot, vals, k, row, col, value)
     return put(mode, slot, vals, k, col, row, value)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_number(slot, vals, k, value):
     """Add the number of entry k to its place, as `put` in the mode NUMBERS; return the number of the next entry."""
     vals[slot[k]] += value
     return k + 1
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_pair(slot, vals, k, value):
     """Add the number of an entry of Phi_q and of its mirror image to their places; return the number of the next."""
     return add_number(slot, vals, add_number(slot, vals, k, value), value)

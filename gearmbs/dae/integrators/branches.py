@@ -128,7 +128,7 @@ def _determinant_sign(st, plan, factors):
     return sign
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _pencil_sign(functions, st):
     """Return the sign of det(dG/dy + gamma dG/dy') at the iterate for large gamma; 0 if it cannot be told.
 
@@ -169,7 +169,7 @@ def _pencil_sign(functions, st):
     return sign
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def is_lost(functions, st, plan, factors):
     """Return whether the step has left the solution, as the derivatives at the iterate itself tell.
 

@@ -147,7 +147,7 @@ def apply_correction(delta, gamma, weight, y, yp):
     return weighted_max(delta, weight)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
 def equations_hold(functions, st):
     """Return whether the residual at the iterate is no more than tolerances and rounding explain, equation by equation.
 
@@ -194,7 +194,7 @@ def rates_settle(st):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
 def _verdict(functions, st, rate):
     """Return CONVERGED where a corrector that gets no further is harmless: all equations hold, and it is at its end.
 
@@ -221,7 +221,7 @@ def amount_left(st):
     return min(LOOSEST_AT_KINKS if meets_kinks(st) else LOOSEST, 0.5**st.order)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
 def correct(functions, st, plan, factors):
     """Iterate from the prediction in ``st.y`` and ``st.yp`` until the corrector test is passed.
 

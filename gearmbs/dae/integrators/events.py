@@ -36,7 +36,7 @@ STOP = 1
 RESTART = 2
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def interpolate(functions, st, part, t, y, yp):
     """Write y and y' at ``t`` from the polynomial of the last step, of its order through the newest points."""
     settle_between(
@@ -45,7 +45,7 @@ def interpolate(functions, st, part, t, y, yp):
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def write_outputs(functions, st, part, t):
     """Write all outputs up to ``t``, which lies in the last step; at its very end the corrector's values."""
     while st.next_output < st.outputs.shape[0] and st.outputs[st.next_output] <= t:
@@ -63,7 +63,7 @@ def write_outputs(functions, st, part, t):
         st.next_output = row + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _root(functions, st, part, which, a, fa, b, fb):
     """Return where event ``which`` changes sign between a and b: Illinois method on the polynomial, then bisection.
 
@@ -112,13 +112,13 @@ def _root(functions, st, part, which, a, fa, b, fb):
     return b
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sample_time(st, i):
     """Return the time of sample i of the last step."""
     return st.t_new if i == SAMPLES else st.t_old + (st.t_new - st.t_old) * (i / SAMPLES)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _sample(functions, st, part):
     """Sample the event functions over the last step into ``st.g_between``; return the samples from one to the next.
 
@@ -157,7 +157,7 @@ def _sample(functions, st, part):
     return stride
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _value_at(functions, st, part, which, at):
     """Return event ``which`` on the polynomial of the last step, ``at`` a part of it; ``st.g_new`` is overwritten."""
     interpolate(functions, st, part, st.t_old + at * (st.t_new - st.t_old), st.y_between, st.yp_between)
@@ -167,7 +167,7 @@ def _value_at(functions, st, part, which, at):
     return st.g_new[which]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _turn_beyond_zero(functions, st, part, which, first, last):
     """Return the part of the last step at which an event that has one sign at both ends has the other; NaN for none.
 
@@ -210,7 +210,7 @@ def _turn_beyond_zero(functions, st, part, which, first, last):
     return np.nan
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _store_crossing(st, first, root, which):
     """Insert a crossing among those of the step, from place ``first`` on, in order of time."""
     p = st.n_crossings
@@ -223,7 +223,7 @@ def _store_crossing(st, first, root, which):
     st.n_crossings += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def locate_events(functions, st, part):
     """Find and store the crossings of the last step; leave the event functions at its end in ``st.g_new``.
 
@@ -275,7 +275,7 @@ def locate_events(functions, st, part):
     return cut, action
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def end_of_step(st):
     """Keep the event functions of the end of the step for the next one; return whether they are finite."""
     for e in range(st.n_events):
@@ -286,7 +286,7 @@ def end_of_step(st):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def cut_step(functions, st, part, cut):
     """Let the last step end at a crossing: replace its end by the polynomial's value there."""
     interpolate(functions, st, part, cut, st.y_between, st.yp_between)

@@ -24,7 +24,7 @@ LEAP = 100.0
 """Ratio of a derivative to that by the rate, and to itself before: the square of that of two distances from a pole."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _watch_leaps(st):
     """Note in ``st.leapt`` an unknown whose own derivative, without that of its rate, has leapt since the last matrix.
 
@@ -41,7 +41,7 @@ def _watch_leaps(st):
             st.leapt = st.entry_col[p]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def evaluate_matrix(functions, st):
     """Evaluate the Newton matrix at ``st.y``, and now and then its slope dG/dy' by a second evaluation."""
     jacobian = functions.jacobian
@@ -67,7 +67,7 @@ def evaluate_matrix(functions, st):
     st.matrix_judged = False
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def carry_over(st):
     """Bring the matrix to the step's leading coefficient: only entries with a slope depend on it."""
     change = st.gamma - st.gamma_evaluated
@@ -77,7 +77,7 @@ def carry_over(st):
         matrix[p] = jac[p] + change * slope[p]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def leaves_little_out(st, plan):
     """Return whether what a plan leaves out is negligible: all after an evaluation, then what has been carried over."""
     limit, matrix, carried, small = plan.limit, st.matrix, st.carried, True
@@ -92,7 +92,7 @@ def leaves_little_out(st, plan):
     return small
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def factor_matrix(st, plan, factors):
     """Factor the matrix carried over to the step's leading coefficient; return whether its plan still fits."""
     carry_over(st)
@@ -105,7 +105,7 @@ def factor_matrix(st, plan, factors):
     return leaves_little_out(st, plan) and refactor(plan, factors, st.matrix) <= st.growth_limit
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def form_matrix(functions, st, plan, factors):
     """Bring the factored matrix up to date for the open step, if it has to be.
 
@@ -144,7 +144,7 @@ def form_matrix(functions, st, plan, factors):
     return RUNNING
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def renew_matrix(functions, st, plan, factors):
     """Evaluate and factor the matrix at the iterate in ``st.y``; return whether its pivots fit."""
     evaluate_matrix(functions, st)

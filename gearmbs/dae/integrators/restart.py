@@ -74,7 +74,7 @@ BLOCK_ERROR = 5.0
 smaller one of the next order, and the first step is as long as its error allows."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def start_afresh(st):
     """Forget the past after all, where a step beyond a possible discontinuity was refused; return whether it was that.
 
@@ -92,7 +92,7 @@ def start_afresh(st):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def shorten_first_step(st):
     """Choose the size of the next attempt of a first step, and from two attempts the rates it starts with.
 
@@ -133,7 +133,7 @@ def shorten_first_step(st):
     st.h = h * min(max(ratio, FIRST_SHRINK[0]), FIRST_SHRINK[1])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _size_block(st, jump, bend):
     """Bound the size of a block by what the unknown does whose rate has jumped the most, all in tolerances.
 
@@ -143,7 +143,7 @@ def _size_block(st, jump, bend):
         st.h_block = min(st.h_block, (jump / bend) ** 0.8 * (BLOCK_SIZE / jump) ** 0.2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def take_block(functions, st, plan, factors):
     """After the first step of a start within a run, replace its past by that of a block of points beyond, if one holds.
 
@@ -207,7 +207,7 @@ def take_block(functions, st, plan, factors):
     return code
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _guess_points(st, h):
     """Place the points of a block on the tangent."""
     times, rows = times_from(st, 1), rows_from(st, 1)
@@ -217,7 +217,7 @@ def _guess_points(st, h):
             rows[j, i] = rows[0, i] + j * h * st.differential[i] * st.yp_start[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _move_points(st, h, ratio):
     """Take the points of a block elsewhere on their polynomial, ``ratio`` times as far from the newest point."""
     times, rows, weights = times_from(st, 1), rows_from(st, 1), st.respacing
@@ -232,7 +232,7 @@ def _move_points(st, h, ratio):
     resample(rows, POINTS, weights, st.nodes)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _settle_points(functions, st, plan, factors, h):
     """Correct the points of a block in sweeps of implicit Euler; return whether they converge."""
     n = st.y.shape[0]
@@ -275,7 +275,7 @@ def _settle_points(functions, st, plan, factors, h):
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _unsettled_at_start(functions, st, plan, factors):
     """Return by how much a step of a block would move what its polynomial leaves of the equations where it begins.
 
@@ -293,7 +293,7 @@ def _unsettled_at_start(functions, st, plan, factors):
     return weighted_max(st.delta, st.w_error)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _block_error(st, h):
     """Return the local error of the order below that of a block, in a step of its size from the newest point."""
     times, nodes = times_from(st, 1), st.nodes
@@ -303,7 +303,7 @@ def _block_error(st, h):
     return bdf.local_error(h, nodes, BLOCK_ORDER, difference)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _go_on(st, h):
     """Replace the past by values of the block's polynomial, and go on with a step of its size, or as long as allowed.
 

@@ -379,14 +379,14 @@ def state_layout(sizes: Sizes) -> BlockLayout[RunState]:
 # window the rows still needed are moved to its end, once in many steps.
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def copy(source, target):
     """Copy a vector; a slice assignment would bring numba's checks of shapes and their messages with it."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def times_from(st, first):
     """Return the times of the stored points from the ``first``-th on, newest first.
 
@@ -395,14 +395,14 @@ def times_from(st, first):
     return vector_at(st.window_t, st.newest + first, HISTORY - first)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def rows_from(st, first):
     """Return the values of the stored points from the ``first``-th on, shape (HISTORY - first, n)."""
     n = st.y.shape[0]
     return matrix_at(st.window_y, (st.newest + first) * n, HISTORY - first, n)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def open_row(st):
     """Make room for a new point in front of the stored ones."""
     if st.newest == 0:
@@ -416,7 +416,7 @@ def open_row(st):
     st.newest -= 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def resample(rows, k, weights, old):
     """Replace the rows 1 to k by ``sum_m weights[j, m] rows[m]`` over all rows from 0 to k; ``old`` is scratch."""
     for i in range(rows.shape[1]):
@@ -429,7 +429,7 @@ def resample(rows, k, weights, old):
             rows[j, i] = v
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def respace(st):
     """Re-interpolate the history to the open step's size: fixed leading coefficients (GSTIFF).
 
@@ -466,7 +466,7 @@ def respace(st):
     return moved
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def record_history(st, first):
     """Append the rewritten history from the ``first``-th point on, oldest first, as records of order 0."""
     times, hist = times_from(st, first), rows_from(st, first)
@@ -480,7 +480,7 @@ def record_history(st, first):
         st.n_records = p + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def forget(st):
     """Forget the history but its newest point and go on at order one."""
     st.n_past = 1

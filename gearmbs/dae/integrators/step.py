@@ -87,7 +87,7 @@ STRETCH = 1.1
 With 1.05, 1.1, 1.2 and 1.35 the pair takes 8500, 8638, 8994 and 9531 residuals for a thousand points."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def open_step(st):
     """Take a row of the history for the next step, unless one is open already.
 
@@ -123,7 +123,7 @@ def open_step(st):
     return s.RUNNING
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def fitted_end(h, t, stop):
     """Return the end of a step of about ``h``: not beyond ``stop``, and without a sliver left before it."""
     if t + 1.0001 * h >= stop:
@@ -133,7 +133,7 @@ def fitted_end(h, t, stop):
     return t + h
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def lands(st, t, h_min, stop):
     """Return whether steps from ``t`` land on the communication point that is gone to.
 
@@ -144,14 +144,14 @@ def lands(st, t, h_min, stop):
     return st.jumps_in_turn >= IN_TURN and st.asked <= stop and way > CLOSE * st.h and way > h_min
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def landing_end(h, t, stop, stretch):
     """Return the end of the first of equal steps that land on ``stop``: as few as are at most ``stretch * h`` long."""
     count = np.ceil((stop - t) / (stretch * h))
     return stop if count <= 1.0 else t + (stop - t) / count
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def choose_end(st):
     """Choose end, size and order of the attempt, and set the weights of its tests.
 
@@ -210,7 +210,7 @@ def choose_end(st):
     return s.RUNNING
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def predict(st):
     """Set coefficients and prediction of the open step, and start the iterate there."""
     t, h, k = st.t_new, st.step, st.order
@@ -231,7 +231,7 @@ def predict(st):
     copy(yp_pred, yp)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def solve_step(functions, st, plan, factors):
     """Run the corrector; renew its matrix at the iterate, or excuse it by rounding, where it converges too slowly.
 
@@ -266,7 +266,7 @@ def solve_step(functions, st, plan, factors):
     return code
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def step_before_jump(st):
     """Try a refused step that lands on a stop once more, with the equations as they are a little before; return so.
 
@@ -280,7 +280,7 @@ def step_before_jump(st):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def refuse_by_newton(st, code):
     """Choose how to go on after the corrector failed: with a new matrix, a smaller step, or other pivots.
 
@@ -326,7 +326,7 @@ def refuse_by_newton(st, code):
     return s.RUNNING
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def correction_norm(st, row):
     """Store the corrector's result in ``row`` and its distance from the prediction in ``st.delta``; return its norm."""
     y, y_pred, delta = st.y, st.y_pred, st.delta
@@ -340,7 +340,7 @@ def correction_norm(st, row):
     return weighted_max(delta, st.w_error)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def passes_error_test(st, plan, factors):
     """Store the result as the newest point and return whether its local error is within the tolerance, or rounding."""
     row = rows_from(st, 0)[0]
@@ -365,7 +365,7 @@ def passes_error_test(st, plan, factors):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def refuse_by_error(st):
     """Choose order and size of the next attempt after the error test failed."""
     forget_noise(st)
@@ -392,7 +392,7 @@ def refuse_by_error(st):
         st.starting = False
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def accept(st):
     """Take the result as the new point of the history."""
     if st.n_past == 1:
@@ -415,7 +415,7 @@ def accept(st):
         st.matrix_wanted = True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def deliver(functions, st, part):
     """Deliver crossings, outputs and the record of the accepted step, and prepare the next one.
 
@@ -454,7 +454,7 @@ def deliver(functions, st, part):
     return close_step(functions, st)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def record_watched(st):
     """Keep what the corrector's last evaluation has left in the watched places, before another one comes."""
     n, watched, work = st.y.shape[0], st.watched, st.work
@@ -464,7 +464,7 @@ def record_watched(st):
             row[n + k] = work[watched[k]]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def record_step(st):
     """Append the accepted step to the records."""
     p = st.n_records
@@ -476,7 +476,7 @@ def record_step(st):
     st.n_records = p + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def choose_next(st):
     """Set order and size of the step after an accepted one."""
     h, h_wanted = st.step, st.h_wanted
@@ -496,7 +496,7 @@ def choose_next(st):
         st.h = max(st.h, before) if st.jumps_in_turn >= IN_TURN else before
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def close_step(functions, st):
     """End the run at its end time; let the hook look at the new point, and heed what it says.
 
@@ -523,7 +523,7 @@ def close_step(functions, st):
     return s.RUNNING
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _take_steps(functions, st, part, plan, factors, max_accepted):
     """Take steps, see `advance`; return the code."""
     accepted = 0
@@ -567,7 +567,6 @@ def _take_steps(functions, st, part, plan, factors, max_accepted):
     cache=True,
     nogil=True,
     error_model="numpy",
-    _nrt=False,
 )
 def advance(bound, st, part, plan, factors, max_accepted):
     """Take at most ``max_accepted`` accepted steps, none after one that ends at ``st.t_pause`` or later.

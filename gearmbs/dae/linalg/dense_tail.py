@@ -29,7 +29,7 @@ def padded(size: int) -> int:
     return -(-size // LANES) * LANES
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def _through_four(lower, first, column, rows, upper):
     """Return the entries of a column of U in rows ``first`` to ``first + 3``: L^-1 times what stands there."""
     a, at = rows * column + first, rows * first + first
@@ -40,7 +40,7 @@ def _through_four(lower, first, column, rows, upper):
     return u, v, y, upper[a + 3] - lower[at + 3] * u - lower[b + 3] * v - lower[c + 3] * y
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def _less_four(lower, upper, first, k, lanes, pair):
     """Eliminate from column k, and the one behind it if ``pair``, with the four columns from ``first`` on."""
     rows = LANES * lanes
@@ -61,7 +61,7 @@ def _less_four(lower, upper, first, k, lanes, pair):
         put_lanes(upper, p + lanes + b, left)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def largest_in(room, place, grown):
     """Return the largest of lanes without a sign, NaN if one is; a place of ``room`` is overwritten by them."""
     put_lanes(room, place, grown)
@@ -71,7 +71,7 @@ def largest_in(room, place, grown):
     return double_of(top)
 
 
-@njit(float64(int64, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy", _nrt=False, fastmath={"contract"})
+@njit(float64(int64, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def factor_tail(tail, lower, upper, pivot_inv):
     """Factor the block without a choice of pivots, four columns at a time.
 
@@ -129,12 +129,7 @@ def factor_tail(tail, lower, upper, pivot_inv):
 
 
 @njit(
-    types.void(int64, _VEC, _VEC, _VEC, _VEC, _VEC),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-    _nrt=False,
-    fastmath={"contract"},
+    types.void(int64, _VEC, _VEC, _VEC, _VEC, _VEC), cache=True, nogil=True, error_model="numpy", fastmath={"contract"}
 )
 def solve_tail(tail, lower, upper, pivot_inv, rest, x):
     """Solve with L and then with U in the tail, four columns at a time; the last division by pivots is left out.
@@ -194,7 +189,7 @@ def solve_tail(tail, lower, upper, pivot_inv, rest, x):
 _UVEC = uint32[::1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def fill_blocks(plan, blocks, vals):
     """Write the entries of the matrix with values ``vals`` to the blocks, long before lanes of them are read."""
     at, src, scale = plan.tail_at, plan.tail_src, plan.tail_scale
@@ -204,7 +199,7 @@ def fill_blocks(plan, blocks, vals):
         blocks[at[e]] = vals[src[e]] * scale[e]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def act_on_blocks(plan, blocks, lu, step):
     """Eliminate the tail's rows of the columns of a step with the earlier pivots that act on them.
 
@@ -223,7 +218,7 @@ def act_on_blocks(plan, blocks, lu, step):
         put_lanes(blocks, b, lanes_at(blocks, b) - lanes_at(blocks, np.int64(by[e])) * lu[u[e]])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def divide_blocks(plan, blocks, pivot_inv, step, growth):
     """Divide the blocks of a step's columns by their pivots.
 
@@ -251,7 +246,7 @@ def divide_blocks(plan, blocks, pivot_inv, step, growth):
     return grown, spoiled
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def less_blocks(kept, q, last, blocks, by, numbers, of):
     """Return lanes less the products of blocks and numbers, in two sums, or each would wait for the one before.
 
@@ -275,7 +270,7 @@ def less_blocks(kept, q, last, blocks, by, numbers, of):
     return kept - odd
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def act_at_last(plan, blocks, lu):
     """Do what `act_on_blocks` does in the last step, one changed block after the other."""
     to, ptr = plan.last_to, plan.last_ptr
@@ -284,14 +279,14 @@ def act_at_last(plan, blocks, lu):
         put_lanes(blocks, b, less_blocks(lanes_at(blocks, b), q, last, blocks, plan.act_by, lu, plan.act_u))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=True, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def tail_in(plan, blocks):
     """Return the tail's own block."""
     first = LANES * plan.block_col.shape[0]
     return vector_at(blocks, first, blocks.shape[0] - first)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def factor_behind(plan, factors, growth):
     """Factor the tail after all pivots before it, in the last step; return the largest multiplier of all blocks."""
     blocks, rest = factors.blocks, factors.rest
@@ -306,7 +301,6 @@ def factor_behind(plan, factors, growth):
     cache=True,
     nogil=True,
     error_model="numpy",
-    _nrt=False,
     fastmath={"contract"},
 )
 def open_tail(tail, lane_ptr, block_col, blocks, x, rest):
@@ -345,7 +339,7 @@ def open_tail(tail, lane_ptr, block_col, blocks, x, rest):
 # Blocks of eight rows of U before the tail, in the tail's columns: what the tail's unknowns give to those before them.
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def fill_above(plan, factors):
     """Write the entries of U in the tail's columns, as the levels have left them, to their blocks."""
     above, at, lu = factors.above, plan.above_at, factors.lu
@@ -356,7 +350,7 @@ def fill_above(plan, factors):
         above[at[p]] = lu[first + p]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True, fastmath={"contract"})
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def take_above(plan, factors):
     """Take from ``factors.x`` before the tail what the tail's unknowns, which stand there, give."""
     x, above, column, ptr = factors.x, factors.above, plan.above_col, plan.above_ptr

@@ -34,7 +34,7 @@ from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, Struct, Vector, v
 # Factors and substitutions column by column (left-looking), where columns are taken together as nodes.
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _act_by_nodes(plan, factors, k):
     """Eliminate from column k, spread out in ``factors.x``, what the earlier pivots act on it, and store U's part.
 
@@ -75,7 +75,7 @@ def _act_by_nodes(plan, factors, k):
         p += stop - j
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def factor_by_columns(plan, factors, vals):
     """Factor a matrix column by column; return what `gearmbs.dae.linalg.sparse_lu.factor` does."""
     x, lu, pivot_inv, blocks = factors.x, factors.lu, factors.pivot_inv, factors.blocks
@@ -115,7 +115,7 @@ def factor_by_columns(plan, factors, vals):
     return double_of(top)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def forward_by_nodes(plan, factors):
     """Solve L x = x in ``factors.x``, the columns of a node together."""
     x, w, lu = factors.x, factors.w, factors.lu
@@ -144,7 +144,7 @@ def forward_by_nodes(plan, factors):
         k = end
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def backward_by_columns(plan, factors):
     """Take from ``factors.x`` what the unknowns above the diagonal of U give, column by column."""
     x, lu, pivot_inv, u_pos, u_ptr = factors.x, factors.lu, factors.pivot_inv, plan.u_pos, plan.u_ptr
@@ -221,7 +221,7 @@ def new_factors(plan: LUPlan) -> LUFactors:
     return _layout(len(plan.row_from), plan.tail, entries, len(plan.block_col), len(plan.above_col)).new()
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _factor_by_levels(plan, factors, vals):
     """Factor the matrix with values ``vals`` level by level; return what `factor` does."""
     lu, pivot_inv, blocks = factors.lu, factors.pivot_inv, factors.blocks
@@ -262,7 +262,7 @@ def _factor_by_levels(plan, factors, vals):
     return double_of(top)
 
 
-@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
 def factor(plan, factors, vals):
     """Factor the matrix with values ``vals`` along the plan.
 
@@ -283,7 +283,7 @@ def factor(plan, factors, vals):
     return refactor(plan, factors, vals) if fits(plan, vals) else np.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def fits(plan, vals):
     """Return whether the entries that a plan leaves out are negligible in the matrix with values ``vals``."""
     limit, small = plan.limit, True
@@ -292,7 +292,7 @@ def fits(plan, vals):
     return small
 
 
-@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
 def refactor(plan, factors, vals):
     """Factor as `factor` does, without a look at the entries that the plan leaves out."""
     if has_nodes(plan.node_end):
@@ -300,7 +300,7 @@ def refactor(plan, factors, vals):
     return _factor_by_levels(plan, factors, vals)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _solve_tail(plan, factors, x):
     """Solve for the unknowns of the dense tail in ``x``, which is solved with L up to there."""
     blocks = factors.blocks
@@ -355,7 +355,7 @@ def solve(plan, factors, b, out):
         x[k] = 0.0
 
 
-@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _MAT), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _MAT), cache=True, nogil=True, error_model="numpy")
 def solve_pair(plan, factors, pair):
     """Solve for two right-hand sides at once.
 

@@ -49,7 +49,7 @@ then two vectors that come and go."""
 CROSS_2 = CROSS + 3
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def has_angles(at):
     """Return whether a body, given its places, has Euler angles."""
     return at[T.AT_ANGLES] > 0
@@ -58,7 +58,7 @@ def has_angles(at):
 # --- kinematics ----------------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def inertia_times(kin_row, body_row, v, i, out, k, s):
     """Write J_global v to ``out[k:k+3]``; ``s`` has three scratch places."""
     for c in range(3):
@@ -72,7 +72,7 @@ def inertia_times(kin_row, body_row, v, i, out, k, s):
         out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_ground(kin):
     """Set the ground's row: the global frame at rest, with no Euler axes."""
     row = kin[0]
@@ -81,7 +81,7 @@ def update_ground(kin):
     row[KIN_A] = row[KIN_A + 4] = row[KIN_A + 8] = 1.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def stand_still(at, modal, row):
     """Set a row of the kinematics table to the constant orientation of a body that does not turn."""
     for c in range(row.size):
@@ -90,7 +90,7 @@ def stand_still(at, modal, row):
         row[KIN_A + c] = modal[at[T.AT_MODAL] + c]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def update_body(y, at, code, body_row, modal, partial, turn, first, row, moment):
     """Fill a body's row of the kinematics table from its positions and velocities.
 
@@ -133,7 +133,7 @@ def update_body(y, at, code, body_row, modal, partial, turn, first, row, moment)
 # --- residual ------------------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def body_residual(y, yp, at, body_row, gravity, modal, partial, kin, out):
     """Write a body's rows of eq. (5) and (6) without loads and constraints.
 
@@ -163,7 +163,7 @@ def body_residual(y, yp, at, body_row, gravity, modal, partial, kin, out):
         modal_residual(y, yp, at, modal, partial, kin, out)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_wrench(at, row, out):
     """Bring the forces added up in a body's row of the kinematics table to its rows of eq. (5), and mu to eq. (6)."""
     u, r = at[T.AT_U], at[T.AT_R]
@@ -181,7 +181,7 @@ def add_wrench(at, row, out):
 # --- Jacobian ------------------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def rigid_entries(mode, cj, y, at, body_row, kin, s, slot, vals, k):
     """Hand over the inertia terms of eq. (5) and (6) of a body that turns; return the number of the next entry.
 
@@ -231,7 +231,7 @@ def rigid_entries(mode, cj, y, at, body_row, kin, s, slot, vals, k):
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def body_entries(mode, cj, y, at, body_row, modal, partial, kin, s, slot, vals, k):
     """Hand over the entries of a body's inertia in eq. (5) and (6); return the number of the next entry.
 
@@ -266,7 +266,7 @@ def body_entries(mode, cj, y, at, body_row, modal, partial, kin, s, slot, vals, 
 # --- other coordinates ---------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def displace_body(b, y, d, w, at, kin, s):
     """Move a body of y by its spatial displacements in ``d`` and change its spatial velocities by those in ``w``.
 
@@ -304,7 +304,7 @@ def displace_body(b, y, d, w, at, kin, s):
     euler_rates(kin, b, s, 3, y, e)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def body_from_pose(b, pose, y, at, code, body_row, modal, partial, kin, s):
     """Fill a body's positions, velocities and momenta in y from its pose; its modal coordinates are there already.
 

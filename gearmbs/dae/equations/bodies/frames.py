@@ -64,7 +64,7 @@ def shape_table(position: np.ndarray, phi: np.ndarray, psi: np.ndarray) -> np.nd
     return np.concatenate([position, both.T.ravel(), lanes.ravel()])
 
 
-@njit(cache=True, error_model="numpy", _nrt=True, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def shapes_of(f, at, modal):
     """Return phi_k and psi_k of elastic frame f: x, y and z of both, six rows with an entry for each mode."""
     return matrix_at(modal, at[f, T.AT_SHAPE] + 3, 6, at[f, T.AT_MODES])
@@ -161,7 +161,7 @@ def own_rate(b, i, y, at, kin):
     return y[at[b, T.AT_U] + i] if i < 3 else y[at[b, T.AT_EPS] + i - 3]
 
 
-@njit(cache=True, error_model="numpy", _nrt=True, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def partials(f, at, partial):
     """Return the partial derivatives of elastic frame f, a row for each angle and mode."""
     return matrix_at(partial, at[f, T.AT_PARTIAL], 3 + at[f, T.AT_MODES], PARTIALS)

@@ -209,7 +209,7 @@ def moving(modal, at, n):
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=True, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def places_in(modal, at, n):
     """Return where the modes stand in a body's present state, as a view; see `moving`."""
     wide = stride(n)

@@ -22,10 +22,10 @@ from gearmbs.dae.equations.unknowns import put
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
-from gearmbs.kernels.structs import vector_at
+from gearmbs.kernels.structs import uncounted, vector_at
 
 
-@njit(I8(I8, F8, VEC, IVEC, VEC, VEC, VEC, VEC, IVEC, VEC, I8), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(I8(I8, F8, VEC, IVEC, VEC, VEC, VEC, VEC, IVEC, VEC, I8), cache=True, late=True, error_model="numpy")
 def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, s, slot, vals, k):
     """Hand over the entries of a body's modal inertia, stiffness and damping; return the number of the next entry.
 
@@ -42,6 +42,8 @@ def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, s, slot, vals, 
     s : ndarray
         Scratch, 30 places.
     """
+    slot, vals, s = uncounted(slot), uncounted(vals), uncounted(s)
+    at, modal, partial, kin_row = uncounted(at), uncounted(modal), uncounted(partial), uncounted(kin_row)
     n, p, e, th = at[T.AT_MODES], at[T.AT_P], at[T.AT_EPS], at[T.AT_THETA]
     pf, vf, qf = at[T.AT_PF], at[T.AT_VF], at[T.AT_QF]
     change, h, gyro = present(partial, at[T.AT_PARTIAL], n)
@@ -76,7 +78,7 @@ def modal_body_entries(mode, cj, y, at, modal, partial, kin_row, s, slot, vals, 
     return pair_entries(mode, at, modal, s, slot, vals, k)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def listed_pairs(modal, at, n, kind):
     """Return the entries of a kind, see `PAIRED`, between two modes: mode l and mode k of each."""
     head, lanes = vector_at(modal, at, HEAD), stride(n) // LANES
@@ -87,7 +89,7 @@ def listed_pairs(modal, at, n, kind):
     return vector_at(modal, first, count), vector_at(modal, first + count, count)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def pair_entries(mode, at, modal, s, slot, vals, k):
     """Hand over the entries between modes, kind by kind and without a look at those that vanish; return as `put` does.
 

@@ -32,7 +32,7 @@ from gearmbs.dae.equations.unknowns import put
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES, lanes_at, put_lanes
 from gearmbs.kernels.pointers import F8, I8, IMAT, IVEC, MAT, VEC
-from gearmbs.kernels.structs import vector_at
+from gearmbs.kernels.structs import uncounted, uncounted_rows, vector_at
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -172,6 +172,8 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
     s : ndarray
         Arm, force and moment of `wrench_at`, then scratch: 18 places.
     """
+    slot, vals, s, partial = uncounted(slot), uncounted(vals), uncounted(s), uncounted(partial)
+    at, kin, frame = uncounted_rows(at), uncounted_rows(kin), uncounted_rows(frame)
     d = partials(f, at, partial)
     owner = marker_body[point]
     for i in range(3):
@@ -268,6 +270,7 @@ def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, f
     """
     if b == 0:
         return k
+    slot, vals, s, partial, at = uncounted(slot), uncounted(vals), uncounted(s), uncounted(partial), uncounted_rows(at)
     # copied out, or they would be read anew after each number that is written
     x, y, z = sign * s[9], sign * s[10], sign * s[11]
     position, turn = at[b, T.AT_R], at[b, T.AT_THETA]
@@ -305,6 +308,7 @@ def put_chain(mode, slot, vals, k, row, f, d, col, sign, at, kin, partial):
     sign : float
         Factor of ``d``.
     """
+    slot, vals, d, partial, at = uncounted(slot), uncounted(vals), uncounted(d), uncounted(partial), uncounted_rows(at)
     for c in range(3):
         k = put(mode, slot, vals, k, row, at[f, T.AT_R] + c, sign * d[col + c])
         k = put(mode, slot, vals, k, row, at[f, T.AT_U] + c, sign * d[col + 6 + c])

@@ -88,7 +88,7 @@ def gradient_size(row):
     return 12 * row[T.TAPE_N_BODIES] + row[T.TAPE_N_UNKNOWNS]
 
 
-@njit(cache=True, error_model="numpy", _nrt=True)
+@njit(cache=True, error_model="numpy")
 def tail(tab, size):
     """Return ``size`` floats at the end of the tapes' scratch, which the evaluators leave alone."""
     return vector_at(tab.tape_work, tab.tape_work.size - size, size)

@@ -137,7 +137,7 @@ force_at = caller(FORCE_SIG)
 turning_at = caller(TURNING_SIG)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def marker_pose(m, marker_body, kin, frame, out, k):
     """Write the frame of marker m, columns ``FRAME_*``, to ``out[k:]``."""
     row = kin[marker_body[m]]
@@ -150,7 +150,7 @@ def marker_pose(m, marker_body, kin, frame, out, k):
         out[k + FRAME_W + c] = row[KIN_W + c]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def fill_inputs(row, y, extra_i, extra_r, angle, fval, sees, out, k):
     """Write the inputs that an element declares to ``out[k:]``; return the place after the last.
 
@@ -186,7 +186,7 @@ def fill_inputs(row, y, extra_i, extra_r, angle, fval, sees, out, k):
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def evaluate_element(row, t, y, tab, want):
     """Call the kernel of a compiled element; ``row`` is that of its first wrench.
 
@@ -231,7 +231,7 @@ def evaluate_element(row, t, y, tab, want):
             shift_to_body(extra_i[sees + 1 + k], tab.marker_body, tab.kin, tab.frame, jac, 12 * k)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def evaluate_lean(row, lean, at, rdata, tab, want):
     """Call the lean kernel of an element; wrench and diagnostics are left where `evaluate_element` has them.
 
@@ -264,7 +264,7 @@ def evaluate_lean(row, lean, at, rdata, tab, want):
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def shift_to_body(m, marker_body, kin, frame, jac, first):
     """Turn columns of marker m's variations ``jac[:, first:first+12]`` into those of its body's frame.
 
@@ -297,7 +297,7 @@ def shift_to_body(m, marker_body, kin, frame, jac, first):
 CONTRACT = {"contract": True, "arcp": True}
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, fastmath=CONTRACT, forceinline=True)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def impact(elastic, stiffness, damping, full_depth, depth, rate):
     """Return f = max(0, f_e + c STEP(d, 0, 0, d_max, 1) d'), f_e = k d^e, and its slopes by depth d and rate d'.
 
@@ -322,13 +322,13 @@ def impact(elastic, stiffness, damping, full_depth, depth, rate):
     return force if pushes else 0.0, by_depth if pushes else 0.0, damping * step if pushes else 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, fastmath=CONTRACT, forceinline=True)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def stored_energy(elastic, exponent, depth):
     """Return the energy of the spring of `impact`, J."""
     return elastic * depth / (exponent + 1.0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, fastmath=CONTRACT, forceinline=True)
+@njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)
 def friction_over_speed(static, dynamic, stiction, transition, speed):
     """Return mu(v)/v, finite at rest, and its derivative by v over v.
 

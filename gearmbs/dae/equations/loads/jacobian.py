@@ -17,7 +17,7 @@ from gearmbs.dae.equations.rotation import KIN_AXES, KIN_DW
 from gearmbs.dae.equations.unknowns import multipliers_are_rates, put
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
-from gearmbs.kernels.structs import matrix_at, vector_at
+from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -39,6 +39,7 @@ def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot
     tab
         Named views of the tables, up to date with y.
     """
+    slot, vals, d = uncounted(slot), uncounted(vals), uncounted(d)
     for q in range(bodies):
         b = tab.extra_i[first + q]
         if b == 0:
@@ -161,6 +162,7 @@ def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
     """
     if b == 0:
         return k
+    slot, vals, y = uncounted(slot), uncounted(vals), uncounted(y)
     at = tab.at[b]
     u, p, th = at[T.AT_U], at[T.AT_P], at[T.AT_THETA]
     f, n = row[T.FORCE_F], row[T.FORCE_N]

@@ -23,7 +23,7 @@ from gearmbs.kernels.structs import matrix_at, vector_at
 
 
 @njit("void(float64[:, ::1], int64, int64, float64, float64[:, ::1], int64, int64, float64[::1], int64)",
-      cache=True, error_model="numpy", _nrt=False)  # fmt: skip
+      cache=True, error_model="numpy")  # fmt: skip
 def add_cross_columns(jac, qi, qj, factor, frame, i, a, b, bk):
     """Add ``factor`` d(a x b) to the moment rows: a is an axis of marker i on I's body, b is fixed in J's body.
 
@@ -57,14 +57,14 @@ def add_cross_columns(jac, qi, qj, factor, frame, i, a, b, bk):
                 jac[3 + r, 12 * qj + 3 + c] += on - factor * br * frame[i, a + c]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def add_direction_columns(jac, q, factor, e, k):
     """Add ``factor`` dpi x e to the force rows, e fixed in the body of block q."""
     if q >= 0:
         expressions.turn_columns(jac, 0, q, factor * e[k], factor * e[k + 1], factor * e[k + 2])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def add_distance_columns(jac, qi, qj, factor, i, j, tab, s):
     """Add ``factor`` d(e) to the force rows, e the direction from J to I.
 
@@ -93,7 +93,7 @@ def add_distance_columns(jac, qi, qj, factor, i, j, tab, s):
             )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def add_angle_columns(jac, qi, qj, factor, i, j, frame, s):
     """Add ``factor`` d(m), m = (c x_I x y_J - s x_I x x_J)/(c^2 + s^2) the moment of a counted angle.
 
@@ -133,7 +133,7 @@ def add_angle_columns(jac, qi, qj, factor, i, j, frame, s):
                 jac[3 + r, 12 * qj + 3 + c] -= factor * turn
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def add_term_columns(k, factor, depends, tab, jac, s):
     """Add the derivatives of ``factor`` times the unit force and moment of one constraint term."""
     kind = tab.term[k, T.TERM_TYPE]
@@ -155,7 +155,7 @@ def add_term_columns(k, factor, depends, tab, jac, s):
         add_distance_columns(jac, qi, qj, factor, i, j, tab, s)
 
 
-@njit(types.void(IVEC, VEC, I8, T.TABLES, VEC, VEC, MAT, I8), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(types.void(IVEC, VEC, I8, T.TABLES, VEC, VEC, MAT, I8), cache=True, late=True, error_model="numpy")
 def reaction_wrench(row, multipliers, first_multiplier, tab, room, wrench, jac, want_jac):
     """Fill F and N of a REACTION element and, if wanted, their derivatives.
 
@@ -197,7 +197,7 @@ def reaction_wrench(row, multipliers, first_multiplier, tab, room, wrench, jac, 
                 add_term_columns(k, -lam * coef, depends, tab, jac, s)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def renew_reactions(y, multipliers, idata, tab):
     """Put the reactions that belong to ``multipliers`` into y; return the largest relative change."""
     change, size = 0.0, 1e-9
@@ -217,12 +217,7 @@ def renew_reactions(y, multipliers, idata, tab):
     return change / size
 
 
-@njit(
-    "float64(float64[::1], float64[::1], int64[::1], float64[::1], float64[::1])",
-    cache=True,
-    error_model="numpy",
-    _nrt=False,
-)
+@njit("float64(float64[::1], float64[::1], int64[::1], float64[::1], float64[::1])", cache=True, error_model="numpy")
 def reactions_from(multipliers, y, idata, rdata, work):
     """As `renew_reactions`, for tables packed in arrays; those in ``work`` must be up to date."""
     return renew_reactions(y, multipliers, idata, T.unpack(idata, rdata, work))
