@@ -197,7 +197,7 @@ def clear_rounding(jac):
                     jac[i, j] = jac[i, j] if abs(jac[i, j]) > least else 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def wrench_of_sums(motion, sums, want, wrench):
     """Fill the wrench on wheel 1 in global components; ``want`` is nonzero if derivatives follow."""
     pose_wrench(motion, sums.q, want)
@@ -278,7 +278,7 @@ def put_totals(totals, diag):
     diag[7] = totals.normal_force
 
 
-@njit(GEAR_CONTACT_SIG, cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(GEAR_CONTACT_SIG, cache=True, nogil=True, error_model="numpy")
 def gear_contact(gi, gr, R1, A1, v1, w1, R2, A2, v2, w2, wrench, jac, diag, want_jac, work):
     """Wrench of the contact of two wheels, its derivatives and diagnostics.
 
@@ -347,7 +347,7 @@ def wheel_frame(frames, k):
     )
 
 
-@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def contact_force(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Hand the frames of the two wheels to `gear_contact`, whose address stands before its integers.
 

@@ -41,14 +41,14 @@ REASSOCIATE = {**CONTRACT, "reassoc": True}
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function for use inside other kernels."""
-    return njit(cache=True, error_model="numpy", _nrt=False, fastmath=CONTRACT)(function)
+    return njit(cache=True, error_model="numpy", fastmath=CONTRACT)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """Compile a small function that disappears in its callers, so that their loops over sections become vectors."""
-    return njit(cache=True, error_model="numpy", _nrt=False, fastmath=CONTRACT, forceinline=True)(function)
+    return njit(cache=True, error_model="numpy", fastmath=CONTRACT, forceinline=True)(function)
 
 
 def summing(function: Callable[..., Any]) -> Any:
     """Compile a function whose sums over sections may be added up in any order, lane by lane."""
-    return njit(cache=True, error_model="numpy", _nrt=False, fastmath=REASSOCIATE)(function)
+    return njit(cache=True, error_model="numpy", fastmath=REASSOCIATE)(function)

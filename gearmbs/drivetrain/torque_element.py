@@ -286,7 +286,7 @@ LAWS = {law.__name__: law for law in (kloss, circuit, controller, pump, resistan
 #     dw = z_J . (dw_I - dw_J) + dpi_J . (z_J x (w_I - w_J)).
 
 
-@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(FORCE_SIG, cache=True, nogil=True, error_model="numpy")
 def shaft_torque(ints, reals, t, frames, states, inputs, want, work, wrench, rates, jac, diagnostics):
     """Write a torque about z_J by the law whose address is ``ints[0]``.
 

@@ -171,7 +171,7 @@ def side_forces(options, wheels, own, sign, roll, gap, rates, contact, sums, dia
         add_contact(options, wheels, own, own_law, rates, contact, sums, diagnostics, want)
 
 
-@njit(TURNING_SIG, cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(TURNING_SIG, cache=True, nogil=True, error_model="numpy")
 def parallel_contact(ints, reals, own, turns, want, work, wrench, slopes, diagnostics):
     """Write the wrench on wheel 1; see `gearmbs.dae.equations.loads.forces`.
 

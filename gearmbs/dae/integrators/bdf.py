@@ -32,7 +32,7 @@ STEP_SEARCH_SWEEPS = 3
 _VEC = float64[::1]
 
 
-@njit(float64(float64, _VEC, int64), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(float64(float64, _VEC, int64), cache=True, nogil=True, error_model="numpy")
 def leading_coefficient(t, nodes, k):
     """Return gamma of the order-k formula at ``t`` over the past times ``nodes`` (newest first)."""
     gamma = 0.0
@@ -41,21 +41,21 @@ def leading_coefficient(t, nodes, k):
     return gamma
 
 
-@njit(float64(float64, _VEC, int64), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(float64(float64, _VEC, int64), cache=True, nogil=True, error_model="numpy")
 def error_constant(t, nodes, k):
     """Return r/(1 + r), the local error of order k in units of corrector minus predictor."""
     r = 1.0 / (leading_coefficient(t, nodes, k) * (t - nodes[k]))
     return r / (1.0 + r)
 
 
-@njit(float64(float64, _VEC, int64, _VEC, _VEC), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(float64(float64, _VEC, int64, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def step_coefficients(t, nodes, k, value, slope):
     """Write the predictor weights for y and y' of the order-k step to ``t`` and return gamma."""
     lagrange_weights(t, nodes, k + 1, value, slope)
     return leading_coefficient(t, nodes, k)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def predict(value, slope, count, hist, y, yp):
     """Write ``y = sum value[j] hist[j]`` and ``yp = sum slope[j] hist[j]`` over ``count`` rows, three at a time."""
     n = y.shape[0]
@@ -76,7 +76,7 @@ def predict(value, slope, count, hist, y, yp):
                 yp[i] = yp[i] + b0 * r0[i] + b1 * r1[i] + b2 * r2[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _divided_difference_weights(nodes, count, weights):
     """Write w with f[t_1 .. t_count] = sum w[j] f(t_j)."""
     for j in range(count):
@@ -87,7 +87,7 @@ def _divided_difference_weights(nodes, count, weights):
         weights[j] = 1.0 / product
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _combination_norm(weights, hist, inv_weight, count):
     top = int64(0)
     for i in range(inv_weight.shape[0]):
@@ -98,7 +98,7 @@ def _combination_norm(weights, hist, inv_weight, count):
     return double_of(top)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def combination_norm(weights, count, hist, inv_weight):
     """Return max_i inv_weight[i] |sum_j weights[j] hist[j, i]| over the first 2 to HISTORY rows.
 
@@ -119,7 +119,7 @@ def combination_norm(weights, count, hist, inv_weight):
     return _combination_norm(weights, hist, inv_weight, HISTORY)
 
 
-@njit(types.void(_VEC, int64, _VEC), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(types.void(_VEC, int64, _VEC), cache=True, nogil=True, error_model="numpy")
 def divided_difference_weights(nodes, count, weights):
     """Write w with f[t_1 .. t_count] = sum w[j] f(t_j); the number of nodes is a constant in most branches."""
     if count == 2:
@@ -138,14 +138,14 @@ def divided_difference_weights(nodes, count, weights):
         _divided_difference_weights(nodes, count, weights)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def divided_difference_norm(nodes, count, hist, inv_weight, weights):
     """Return max_i inv_weight[i] |f_i[t_1 .. t_count]| over the rows of ``hist``; ``weights`` is overwritten."""
     divided_difference_weights(nodes, count, weights)
     return combination_norm(weights, count, hist, inv_weight)
 
 
-@njit(float64(float64, _VEC, int64, float64), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(float64(float64, _VEC, int64, float64), cache=True, nogil=True, error_model="numpy")
 def local_error(h, nodes, k, difference):
     """Return the local error of an order-k step of size h from ``nodes[0]``.
 
@@ -165,7 +165,7 @@ def local_error(h, nodes, k, difference):
     return error_constant(t, nodes, k) * product * difference
 
 
-@njit(float64(float64, _VEC, int64, float64, float64), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(float64(float64, _VEC, int64, float64, float64), cache=True, nogil=True, error_model="numpy")
 def step_for_error(h, nodes, k, difference, target):
     """Return about the step size whose local error at order k is ``target``, within a factor 8 of h.
 

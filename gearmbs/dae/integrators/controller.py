@@ -32,7 +32,7 @@ SHRINK_AT_MOST = 0.5
 FAIL_SHRINK = (0.1, 0.8)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def meets_kinks(st):
     """Return whether derivatives of the solution seem to jump, as at contacts: steps have been refused lately.
 
@@ -43,7 +43,7 @@ def meets_kinks(st):
     return st.since_refused < KINK_MEMORY
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def target(st, k):
     """Return the local error, in tolerances, that steps of order k aim at.
 
@@ -55,13 +55,13 @@ def target(st, k):
     return TARGET if st.constrained or meets_kinks(st) else min(TARGET, 2.0 ** (-0.5 * (k + 1)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def difference_norm(st, k):
     """Return the norm of the difference of order k + 1, over the newest k + 2 points."""
     return divided_difference_norm(times_from(st, 0), k + 2, rows_from(st, 0), st.w_error, st.value)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def step_at_order(st, k, h, nodes):
     """Return the step size at order k from ``nodes[0]``.
 
@@ -77,7 +77,7 @@ def step_at_order(st, k, h, nodes):
     return step_for_error(h, nodes, k, difference_norm(st, k), target(st, k))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def step_reaching(st, k, wanted, h, nodes, difference):
     """Return the step size at order k, or zero without a search where it is less than ``wanted``.
 
@@ -89,7 +89,7 @@ def step_reaching(st, k, wanted, h, nodes, difference):
     return step_for_error(h, nodes, k, difference, target(st, k))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def step_below(st, k, h, nodes):
     """Return the step size at which the two orders below k agree: the smaller of theirs.
 
@@ -100,7 +100,7 @@ def step_below(st, k, h, nodes):
     return min(below, step_at_order(st, k - 2, h, nodes)) if k > 2 else below
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def after_start(st):
     """Set order and step size after an accepted step of a new start within a run, until a lower order does as well.
 
@@ -133,7 +133,7 @@ def after_start(st):
             st.order = k + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def after_success(st):
     """Set order and step size after an accepted step, the newest point of the history.
 
@@ -186,7 +186,7 @@ def after_success(st):
         st.since_change = 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def after_error_failure(st, error, fails):
     """Set order and step size after the error test failed for the ``fails``-th time at this step.
 

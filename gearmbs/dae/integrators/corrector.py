@@ -20,7 +20,7 @@ from gearmbs.kernels.lanes import bits_of, double_of
 _VEC = float64[::1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def weighted_max(v, weight):
     """Return max_i |v[i]| weight[i]; infinity or NaN if an entry is not finite."""
     top = int64(0)
@@ -29,7 +29,7 @@ def weighted_max(v, weight):
     return double_of(top)
 
 
-@njit(int64(_VEC, _VEC), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(int64(_VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def weighted_argmax(v, weight):
     """Return the index of the largest |v[i]| weight[i]."""
     top = -1.0
@@ -42,7 +42,7 @@ def weighted_argmax(v, weight):
     return where
 
 
-@njit(void(STATE_TYPE, _VEC, float64), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(void(STATE_TYPE, _VEC, float64), cache=True, nogil=True, error_model="numpy")
 def set_weights(st, y, h):
     """Set the weights of the error test and of the corrector test from the tolerances at ``y``.
 
@@ -71,7 +71,7 @@ def set_weights(st, y, h):
         w_newton[i] = tested[i] * weight[i] * max(coupled[i], reach)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def renew_weights(st, y, h):
     """Set the weights for a step of size h from ``y`` where they have changed since the last one."""
     if st.rtol > 0.0 or st.step_in_weights:
@@ -119,7 +119,7 @@ SETTLED_RATE = 0.01
 y allows any rate; a correction of that size leaves about its square."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def first_not_finite(v):
     """Return the index of the first entry that is not finite, or -1."""
     for i in range(v.shape[0]):
@@ -128,7 +128,7 @@ def first_not_finite(v):
     return -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def apply_correction(delta, gamma, weight, y, yp):
     """Take ``delta`` off ``y`` and ``gamma delta`` off ``yp``; return its weighted norm, not finite if an entry is not.
 
@@ -147,7 +147,7 @@ def apply_correction(delta, gamma, weight, y, yp):
     return weighted_max(delta, weight)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def equations_hold(functions, st):
     """Return whether the residual at the iterate is no more than tolerances and rounding explain, equation by equation.
 
@@ -176,7 +176,7 @@ def equations_hold(functions, st):
     return st.violation <= 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def rates_settle(st):
     """Return whether the last correction has left the rates as they were, up to a part of them and rounding.
 
@@ -194,7 +194,7 @@ def rates_settle(st):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _verdict(functions, st, rate):
     """Return CONVERGED where a corrector that gets no further is harmless: all equations hold, and it is at its end.
 
@@ -211,7 +211,7 @@ def _verdict(functions, st, rate):
     return CONVERGED if harmless and rates_settle(st) and equations_hold(functions, st) else SLOW
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def amount_left(st):
     """Return what the corrector may leave, in tolerances.
 
@@ -221,7 +221,7 @@ def amount_left(st):
     return min(LOOSEST_AT_KINKS if meets_kinks(st) else LOOSEST, 0.5**st.order)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def correct(functions, st, plan, factors):
     """Iterate from the prediction in ``st.y`` and ``st.yp`` until the corrector test is passed.
 
@@ -292,7 +292,7 @@ GOLDEN_FRACTION = 0.6180339887498949
 """(sqrt(5) - 1)/2, the golden ratio less one."""
 
 
-@njit(float64(STATE_TYPE, PLAN_TYPE, FACTORS_TYPE), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(float64(STATE_TYPE, PLAN_TYPE, FACTORS_TYPE), cache=True, nogil=True, error_model="numpy")
 def rounding_level(st, plan, factors):
     """Return how far rounding alone moves the corrector, in units of the tolerance.
 
@@ -326,7 +326,7 @@ def rounding_level(st, plan, factors):
     return level
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def accept_noise(st, plan, factors, from_prediction):
     """Return whether rounding explains ``st.delta``; if so, leave the better of corrector and prediction in ``st.y``.
 
@@ -363,21 +363,21 @@ def accept_noise(st, plan, factors, from_prediction):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def remember_noise(st):
     """Note the noise in the history, in case this step is refused after all."""
     st.noise_before = st.noise
     st.noise_left_before = st.noise_left
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def forget_noise(st):
     """Take back what `accept_noise` noted in a step that was refused: it has not come into the past."""
     st.noise = st.noise_before
     st.noise_left = st.noise_left_before
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(cache=True, nogil=True, error_model="numpy")
 def count_noise(st):
     """Count an accepted step while there is noise in the history, and note in ``st.noisy`` whether there is."""
     st.noisy = st.noise_left > 0

@@ -308,7 +308,7 @@ def _solve_tail(plan, factors, x):
     solve_tail(plan.tail, factors.lower, tail_in(plan, blocks), factors.pivot_inv, factors.rest, x)
 
 
-@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(types.void(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC), cache=True, nogil=True, error_model="numpy")
 def solve(plan, factors, b, out):
     """Write the solution of A out = b; ``out`` may be ``b`` itself.
 

@@ -70,7 +70,7 @@ def shapes_of(f, at, modal):
     return matrix_at(modal, at[f, T.AT_SHAPE] + 3, 6, at[f, T.AT_MODES])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def sine_and_cosine(angle):
     """Return sine and cosine, of small angles by their series."""
     if abs(angle) >= SMALL_TURN:
@@ -79,7 +79,7 @@ def sine_and_cosine(angle):
     return angle * (1.0 - square * (1.0 / 6.0 - square / 120.0)), 1.0 - square * (0.5 - square / 24.0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def deform(f, y, at, modal, axes, partial, s):
     """Write where a marker has moved and turned in its body, and the axes of its rotation.
 
@@ -141,19 +141,19 @@ def partials_size(modes: int) -> int:
     return PARTIALS * (3 + modes) + TAIL
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def is_elastic(b, at):
     """Return whether a row of the kinematics table is an elastic frame."""
     return at[b, T.AT_SHAPE] >= 0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def touches_elastic(term, marker_body, bodies):
     """Return whether one of a constraint term's markers is on a modal body."""
     return marker_body[term[T.TERM_I]] >= bodies or marker_body[term[T.TERM_J]] >= bodies
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def own_rate(b, i, y, at, kin):
     """Return the rate of a frame's own coordinate i, six of them."""
     if is_elastic(b, at):
@@ -167,15 +167,13 @@ def partials(f, at, partial):
     return matrix_at(partial, at[f, T.AT_PARTIAL], 3 + at[f, T.AT_MODES], PARTIALS)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def tail_of(f, at):
     """Return where in the table of partial derivatives that begins which follows the rows of elastic frame f."""
     return at[f, T.AT_PARTIAL] + PARTIALS * (3 + at[f, T.AT_MODES])
 
 
-@njit(
-    types.void(I8, VEC, IMAT, VEC, MAT, VEC, VEC, types.boolean), cache=True, late=True, error_model="numpy", _nrt=False
-)
+@njit(types.void(I8, VEC, IMAT, VEC, MAT, VEC, VEC, types.boolean), cache=True, late=True, error_model="numpy")
 def update_frame(f, y, at, modal, kin, partial, scratch, derivatives):
     """Fill the row of elastic frame f in the kinematics table and its partial derivatives.
 
@@ -219,7 +217,7 @@ def update_frame(f, y, at, modal, kin, partial, scratch, derivatives):
         bias(f, at, body, partial, s, own)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def turned_axes(f, at, body, partial, own):
     """Write the axes Y_c in global components to ``own[9:18]``, and their products after the partial derivatives."""
     axes, pairs = tail_of(f, at) + AXES, tail_of(f, at) + PAIRS
@@ -230,7 +228,7 @@ def turned_axes(f, at, body, partial, own):
     cross3(own, 12, own, 15, partial, pairs + 6)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def update_positions(f, at, modal, body, partial, s, own):
     """Fill P_c and X_c of elastic frame f; the arm is in ``s[0:3]``, the axes Y_c are in ``own[9:18]``."""
     shape, d = shapes_of(f, at, modal), partials(f, at, partial)
@@ -250,7 +248,7 @@ def update_positions(f, at, modal, body, partial, s, own):
             row[DX + m] = row[PSI] * own[9 + m] + row[PSI + 1] * own[12 + m] + row[PSI + 2] * own[15 + m]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def update_rates(f, at, body, partial, s, own):
     """Fill the derivatives of a frame's velocities.
 
@@ -289,7 +287,7 @@ def update_rates(f, at, body, partial, s, own):
             row[DW + m] = row[PSI] * s[9 + m] + row[PSI + 1] * s[12 + m]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def own_axes(row):
     """Give a frame the axes of its own coordinates: the global ones, with the rates that its turning gives them."""
     for c in range(KIN_AXES, row.size):
@@ -302,7 +300,7 @@ def own_axes(row):
     row[KIN_ADOT + 6], row[KIN_ADOT + 7] = wy, -wx
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def bias(f, at, body, partial, s, own):
     """Write the accelerations of a frame without those of the coordinates after its partial derivatives.
 
@@ -346,7 +344,7 @@ def bias(f, at, body, partial, s, own):
 POSITION, VELOCITY, FORCE = 0, 1, 2
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def coordinates(b, at):
     """Return the number of coordinates that a frame's position depends on: none of the ground."""
     if b == 0:
@@ -354,7 +352,7 @@ def coordinates(b, at):
     return 3 + at[b, T.AT_ANGLES] + at[b, T.AT_MODES]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def place(b, i, which, at):
     """Return where the position, the velocity or the force row of coordinate i of a frame is in y."""
     if i < 3:
@@ -366,7 +364,7 @@ def place(b, i, which, at):
     return at[b, column] + i - 6
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def direction(b, i, at, partial, out, k):
     """Write T_i, the derivative of a frame's own coordinates by coordinate i of its body, to ``out[k:k+6]``.
 
@@ -382,7 +380,7 @@ def direction(b, i, at, partial, out, k):
         out[k + c] = row[DP + c]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def curvature(b, i, j, g, k, at, partial, s):
     """Return what the Hessian by coordinates i, j of an elastic frame's body has beyond T_i H T_j.
 
@@ -416,7 +414,7 @@ def curvature(b, i, j, g, k, at, partial, s):
     return total + 0.5 * dot3(g, k + 3, s, 0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def turned_twice(b, x, y, at, partial, s):
     """Write sum_mn psi_k,m psi_l,n Y_min x Y_max to ``s[0:3]``, given the rows of modes k and l."""
     pairs = tail_of(b, at) + PAIRS
@@ -427,13 +425,13 @@ def turned_twice(b, x, y, at, partial, s):
         s[c] = xy * partial[pairs + c] + xz * partial[pairs + 3 + c] + yz * partial[pairs + 6 + c]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def turns(d):
     """Return whether a mode turns a frame, given its row of the partial derivatives."""
     return d[PSI] != 0.0 or d[PSI + 1] != 0.0 or d[PSI + 2] != 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def is_idle(b, i, blind, at, partial):
     """Return whether coordinate i of a frame's body is a mode that does not move the frame, and if not blind turns it.
 

@@ -145,13 +145,13 @@ def present_size(modes: int) -> int:
     return LANES * ((PRESENT + PASSING) * lanes_of(modes) + SUMS)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def stride(n):
     """Return how far apart the numbers of n modes are that stand in whole lanes."""
     return (n + LANES - 1) // LANES * LANES
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def integrals(modal, at, n):
     """Return the table of a body with n modal coordinates as views.
 
@@ -175,7 +175,7 @@ def integrals(modal, at, n):
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def moving(modal, at, n):
     """Return what the present state of a body is made of as views, modes in lanes.
 
@@ -217,7 +217,7 @@ def places_in(modal, at, n):
     return vector_at(modal, modes + (1 + LANES) * int(modal[at + LISTED]), n)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def diagonals(modal, at, n):
     """Return the diagonals of M, K and D, in lanes, as views."""
     wide = stride(n)
@@ -225,7 +225,7 @@ def diagonals(modal, at, n):
     return vector_at(modal, first, wide), vector_at(modal, first + wide, wide), vector_at(modal, first + 2 * wide, wide)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def present(partial, at, n):
     """Return dJ/dq (6, n), H (3, n) and sum_l C1_kl v_l (3, n) of a body at present as views.
 
@@ -249,7 +249,7 @@ def present(partial, at, n):
 # linear in q if all integrals are given; leaving some out gives another Lagrangian, not another balance of energy.
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def to_body(kin_row, v, i, out, k):
     """Write the body components of the global vector ``v[i:i+3]`` to ``out[k:k+3]``."""
     x, y, z = v[i], v[i + 1], v[i + 2]
@@ -257,7 +257,7 @@ def to_body(kin_row, v, i, out, k):
         out[k + c] = kin_row[KIN_A + c] * x + kin_row[KIN_A + 3 + c] * y + kin_row[KIN_A + 6 + c] * z
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def spin_in_body(kin_row):
     """Return the body components of the angular velocity."""
     x, y, z = kin_row[KIN_W], kin_row[KIN_W + 1], kin_row[KIN_W + 2]
@@ -268,7 +268,7 @@ def spin_in_body(kin_row):
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def to_global(kin_row, v, i, out, k):
     """Write the global components of the vector ``v[i:i+3]`` given in body components to ``out[k:k+3]``."""
     x, y, z = v[i], v[i + 1], v[i + 2]
@@ -277,7 +277,7 @@ def to_global(kin_row, v, i, out, k):
         out[k + c] = kin_row[a] * x + kin_row[a + 1] * y + kin_row[a + 2] * z
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def passing(partial, at, n):
     """Return the rows of `PASSING` and the room for lanes of sums, as views."""
     wide = stride(n)
@@ -286,7 +286,7 @@ def passing(partial, at, n):
     return vector_at(partial, rows, wide), vector_at(partial, rows + wide, wide), sums
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def lanes_total(sums, m):
     """Return the sum of what stands in lanes ``m``."""
     total = 0.0
@@ -295,9 +295,7 @@ def lanes_total(sums, m):
     return total
 
 
-@njit(
-    types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy", _nrt=False, fastmath={"contract"}
-)
+@njit(types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy", fastmath={"contract"})
 def update_inertia(y, at, modal, partial, body_row):
     """Write J(q) to the body's row and dJ/dq, H and sum_l C1_kl v_l to its place in ``partial``, and q and v behind."""
     n, place = at[T.AT_MODES], at[T.AT_PARTIAL]
@@ -319,7 +317,7 @@ def update_inertia(y, at, modal, partial, body_row):
     add_inertia_change(q_f, first, state, head, sums, body_row)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_inertia_change(q_f, first, state, j0, sums, body_row):
     """Complete dJ/dq and H, and write J(q) = J0 + 1/2 sum_k q_k (J1_k + dJ/dq_k) to a body's row.
 
@@ -365,7 +363,7 @@ def add_inertia_change(q_f, first, state, j0, sums, body_row):
     body_row[i + 5] = body_row[i + 7] = j0[5] + lanes_total(sums, 4)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def complete(first, state, b):
     """Add what does not depend on the modes l to lanes of the state; return twice the one and once the other."""
     constant = lanes_at(first, b)
@@ -374,7 +372,7 @@ def complete(first, state, b):
     return constant + total
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def inertia_change(change, k, w, i, out, j):
     """Write dJ/dq_k w to ``out[j:j+3]``, body components, w in ``w[i:i+3]``; ``change`` as of `present`."""
     x, y, z = w[i], w[i + 1], w[i + 2]
@@ -384,7 +382,7 @@ def inertia_change(change, k, w, i, out, j):
     out[j + 2] = change[2, k] * x + change[4, k] * y + change[5, k] * z
 
 
-@njit(types.void(VEC, IVEC, VEC, VEC), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(types.void(VEC, IVEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def add_momentum(y, at, partial, kin_row):
     """Add sum_k H_k v_k to the angular momentum h of the body's row."""
     n = at[T.AT_MODES]
@@ -404,13 +402,13 @@ def add_momentum(y, at, partial, kin_row):
         kin_row[KIN_H + c] += kin_row[a] * x + kin_row[a + 1] * y_ + kin_row[a + 2] * z
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def has_diagonals(modal, at):
     """Return whether M, K and D of a body are diagonal."""
     return modal[at[T.AT_MODAL] + APART] > 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def row_product(matrix, apart, k, y, i):
     """Return row k of a matrix, which may be diagonal, times ``y[i:i+n]``."""
     if apart:
@@ -421,7 +419,7 @@ def row_product(matrix, apart, k, y, i):
     return total
 
 
-@njit(types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(types.void(VEC, IVEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def set_modal_momenta(y, at, modal, partial, kin_row):
     """Write p_f = dT/dv_f to y."""
     n = at[T.AT_MODES]
@@ -436,7 +434,7 @@ def set_modal_momenta(y, at, modal, partial, kin_row):
         y[at[T.AT_PF] + k] = turning + row_product(mass, apart, k, y, at[T.AT_VF])
 
 
-@njit(types.void(VEC, VEC, IVEC, VEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(types.void(VEC, VEC, IVEC, VEC, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def modal_residual(y, yp, at, modal, partial, kin_row, out):
     """Write the rows p_f' - L_qf, p_f - L_vf and v_f - q_f' of a body; loads and constraints are added elsewhere.
 
@@ -465,7 +463,7 @@ def modal_residual(y, yp, at, modal, partial, kin_row, out):
         out[qf + k] = y[vf + k] - yp[qf + k]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def set_turning_terms(partial, at, n, spin, inertial, turning):
     """Write 1/2 w . dJ/dq_k w + w . sum_l C1_kl v_l and w . H_k of all modes as they stand in the state."""
     row = stride(n) // LANES
@@ -483,7 +481,7 @@ def set_turning_terms(partial, at, n, spin, inertial, turning):
         put_lanes(turning, g, momentum + lanes_at(state, 8 * row + g) * wz)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def diagonal_rows(y, yp, at, modal, places, inertial, turning, out):
     """Write the rows of `modal_residual` if M, K and D are diagonal.
 

@@ -17,7 +17,7 @@ from gearmbs.dae.equations.unknowns import NUMBERS, add_pair, put_pair
 from gearmbs.kernels.jit import njit
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def vector(a, k):
     """Return ``a[k : k + 3]`` as a triple."""
     return a[k], a[k + 1], a[k + 2]
@@ -50,14 +50,12 @@ for _kind, _blocks in {
         HESSIAN_BLOCKS[(_kind, *_block)] = True
 
 
-@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy", _nrt=False)
+@njit("float64(float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def dot3(a, i, b, j):
     return a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
 
 
-@njit(
-    "void(float64[::1], int64, float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy", _nrt=False
-)
+@njit("void(float64[::1], int64, float64[::1], int64, float64[::1], int64)", cache=True, error_model="numpy")
 def cross3(a, i, b, j, out, k):
     x = a[i + 1] * b[j + 2] - a[i + 2] * b[j + 1]
     y = a[i + 2] * b[j] - a[i] * b[j + 2]
@@ -65,7 +63,7 @@ def cross3(a, i, b, j, out, k):
     out[k], out[k + 1], out[k + 2] = x, y, z
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def axes_of(term, k):
     """Return where the axes of I and of J stand in the rows of their markers' frames."""
     return T.MK_AXES + 3 * (term[k, T.TERM_AXES] // 3), T.MK_AXES + 3 * (term[k, T.TERM_AXES] % 3)
@@ -75,7 +73,6 @@ def axes_of(term, k):
     "void(float64[:, ::1], float64[:, ::1], int64, int64, int64, int64, float64[::1], int64)",
     cache=True,
     error_model="numpy",
-    _nrt=False,
 )
 def separation(kin, frame, bi, bj, i, j, out, k):
     """Write P_I - P_J (global) to ``out[k:k+3]``.
@@ -95,7 +92,7 @@ def separation(kin, frame, bi, bj, i, j, out, k):
         out[k + c] = kin[bi, KIN_R + c] + frame[i, c] - kin[bj, KIN_R + c] - frame[j, c]
 
 
-@njit("void(float64[:, ::1], int64, float64, float64[::1], int64)", cache=True, error_model="numpy", _nrt=False)
+@njit("void(float64[:, ::1], int64, float64, float64[::1], int64)", cache=True, error_model="numpy")
 def turned_axis(frame, j, f, out, k):
     """Write y_J cos f - x_J sin f to ``out[k:k+3]``."""
     c, s = np.cos(f), np.sin(f)
@@ -103,7 +100,7 @@ def turned_axis(frame, j, f, out, k):
         out[k + m] = c * frame[j, T.MK_AXES + 3 + m] - s * frame[j, T.MK_AXES + m]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
     """Return (phi, phi_t); write the spatial gradient of each.
 
@@ -154,7 +151,7 @@ def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
     return D.distance_slopes(frame[i], frame[j], scratch, g), 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     """Return d2(phi)/dt2 without the terms in accelerations; ``s`` is scratch."""
     kind = term[k, T.TERM_TYPE]
@@ -176,7 +173,7 @@ def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     return D.distance_bent(frame[i], frame[j], s, kin[bi], kin[bj])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def hessian(k, term, fval, marker_body, kin, frame, hess, s):
     """Write the Hessian of term k over [R_I, theta_I, R_J, theta_J] to ``hess``.
 
@@ -239,7 +236,7 @@ RELATIVE = 9
 """Places of what `relative_motion` writes, three components each, and how many there are."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def relative_motion(i, j, marker_body, kin, frame, out):
     """Write the offset of marker i from marker j, its rate, and its second rate without the terms in accelerations.
 
@@ -268,7 +265,7 @@ def relative_motion(i, j, marker_body, kin, frame, out):
         out[QUADRATIC + 2] += sign * b2
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def dot_motion(k, term, marker_body, kin, frame, s):
     """Return phi of DOT1 term k, its rate, and its second rate without the terms in accelerations.
 
@@ -285,7 +282,7 @@ def dot_motion(k, term, marker_body, kin, frame, s):
     return phi, rate, bent
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_point_term(k, coef, lam, mu, term, marker_body, kin, frame):
     """As the general path of `add_constraints` for a POINT term, whose gradient is a unit vector; return Phi and Phi'.
 
@@ -324,7 +321,7 @@ def add_point_term(k, coef, lam, mu, term, marker_body, kin, frame):
     return value, rate
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_dot_term(k, coef, lam, mu, term, marker_body, kin, frame, s):
     """As the general path of `add_constraints` for a DOT1 term, which has no translations; return Phi and Phi'.
 
@@ -358,7 +355,7 @@ def add_dot_term(k, coef, lam, mu, term, marker_body, kin, frame, s):
     return coef * dot3(frame[i], a, frame[j], b), rate
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def put_point(mode, slot, vals, k, row, coef, term, at, marker_body, frame):
     """Hand over the gradient of a POINT term; return the number of the next entry.
 
@@ -395,7 +392,7 @@ def put_point(mode, slot, vals, k, row, coef, term, at, marker_body, frame):
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def put_dot(mode, slot, vals, k, row, coef, term, at, marker_body, cross):
     """Hand over the gradient of a DOT1 term, given that of its first side; return the number of the next entry.
 

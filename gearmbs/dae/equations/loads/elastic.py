@@ -35,7 +35,7 @@ from gearmbs.kernels.pointers import F8, I8, IMAT, IVEC, MAT, VEC
 from gearmbs.kernels.structs import uncounted, uncounted_rows, vector_at
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def wrench_at(f, point, force, torque, sign, marker_body, kin, frame, s):
     """Write arm, force and moment about the origin of frame f to ``s[0:9]``.
 
@@ -56,7 +56,7 @@ def wrench_at(f, point, force, torque, sign, marker_body, kin, frame, s):
         s[6 + c] += sign * torque[c]
 
 
-@njit(types.void(I8, F8, IVEC, VEC, IVEC, MAT, MAT, VEC), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(types.void(I8, F8, IVEC, VEC, IVEC, MAT, MAT, VEC), cache=True, late=True, error_model="numpy")
 def load_at(f, sign, row, y, marker_body, kin, frame, s):
     """As `wrench_at` for the F and N that a force element has in y.
 
@@ -80,7 +80,7 @@ def load_at(f, sign, row, y, marker_body, kin, frame, s):
     wrench_at(f, row[T.FORCE_I], force, torque, sign, marker_body, kin, frame, s)
 
 
-@njit(types.void(I8, IMAT, VEC, MAT, VEC, VEC, VEC), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(types.void(I8, IMAT, VEC, MAT, VEC, VEC, VEC), cache=True, late=True, error_model="numpy")
 def bring_to_body(f, at, modal, kin, partial, scratch, out):
     """Bring the forces added up for elastic frame f to its body and to the modes: eq. (5), and mu in eq. (6)."""
     row, body, n = kin[f], kin[at[f, T.AT_BODY]], at[f, T.AT_MODES]
@@ -107,7 +107,7 @@ def bring_to_body(f, at, modal, kin, partial, scratch, out):
     add_modal_forces(shape, (s[9], s[10], s[11], s[12], s[13], s[14]), shifts)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def add_modal_forces(shape, wrench, total):
     """Add the forces on modes of a force and a moment along the axes of the rotation to ``total``.
 
@@ -156,7 +156,6 @@ def apply_frame_load(f, s, at, kin, partial, rhs):
     cache=True,
     late=True,
     error_model="numpy",
-    _nrt=False,
 )
 def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_body, kin, frame, partial):
     """Hand over the entries of a load on elastic frame f in the rows of eq. (5); return the next entry's number.
@@ -199,7 +198,7 @@ def put_load(mode, slot, vals, k, f, sign, force, torque, point, s, at, marker_b
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def put_turned(mode, slot, vals, k, f, c, s, at, partial):
     """Hand over the entries by which a load on frame f changes as coordinates turn what it acts along.
 
@@ -250,7 +249,6 @@ def put_turned(mode, slot, vals, k, f, c, s, at, partial):
     cache=True,
     late=True,
     error_model="numpy",
-    _nrt=False,
 )
 def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, frame, partial, to_origin):
     """Hand over ``sign`` times the derivatives of ``s[9:12]`` . x by the coordinates of frame b.
@@ -293,9 +291,7 @@ def put_arm(mode, slot, vals, k, row, b, point, s, sign, at, marker_body, kin, f
     return k
 
 
-@njit(
-    I8(I8, IVEC, VEC, I8, I8, I8, VEC, I8, F8, IMAT, MAT, VEC), cache=True, late=True, error_model="numpy", _nrt=False
-)
+@njit(I8(I8, IVEC, VEC, I8, I8, I8, VEC, I8, F8, IMAT, MAT, VEC), cache=True, late=True, error_model="numpy")
 def put_chain(mode, slot, vals, k, row, f, d, col, sign, at, kin, partial):
     """Hand over the entries of one row that depends on elastic frame f; return the number of the next entry.
 

@@ -20,7 +20,7 @@ from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot, vals, k):
     """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns.
 
@@ -61,7 +61,7 @@ def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot
     return k
 
 
-@njit(I8(I8, F8, I8, VEC, F8, IVEC, T.TABLES, IVEC, VEC, I8), cache=True, late=True, error_model="numpy", _nrt=False)
+@njit(I8(I8, F8, I8, VEC, F8, IVEC, T.TABLES, IVEC, VEC, I8), cache=True, late=True, error_model="numpy")
 def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
     """Entries of the equation of one user-defined state.
 
@@ -105,7 +105,7 @@ def state_entries(mode, t, s, y, cj, idata, tab, slot, vals, k):
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def far_arm_entries(mode, base, b, point, a, s, tab, slot, vals, k):
     """Entries of a force on body b at a marker of another body, as the arm changes with both.
 
@@ -143,7 +143,7 @@ def far_arm_entries(mode, base, b, point, a, s, tab, slot, vals, k):
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy")
 def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
     """Entries of one force element's loads on body b in the rows of eq. (5).
 
@@ -215,7 +215,7 @@ def load_entries(mode, b, sign, row, y, tab, slot, vals, k):
     return k
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True)
 def element_entries(mode, t, row, y, yp, cj, idata, tab, slot, vals, k):
     """Entries of the rows F - F(q, q', t) and N - N(q, q', t) of one force element, and of its own states.
 
