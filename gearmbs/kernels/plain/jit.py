@@ -33,7 +33,7 @@ from gearmbs.logs import tell
 CompilationError = numba.NumbaError
 """What numba raises where a function cannot be compiled."""
 
-OWN_OPTIONS = {"_nrt", "forceinline", "straight"}
+OWN_OPTIONS = {"forceinline", "straight"}
 """Options of kernels that numba does not document, or has not; all that they change is time."""
 
 CHOSEN = numba.config.CACHE_DIR
