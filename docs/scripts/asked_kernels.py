@@ -43,8 +43,7 @@ def note() -> None:
 
 def unlisted(notes: str) -> list[str]:
     """Return what was noted and is compiled neither by its declared signature nor by the list, a line each."""
-    from gearmbs.kernels.asked import texts
-    from gearmbs.kernels.calls import address, entries, import_all, kernel_modules, kernels
+    from gearmbs.kernels.calls import address, entries, import_all, kernel_modules, kernels, texts
 
     import_all()
     known = entries(kernels(kernel_modules()))
@@ -68,7 +67,7 @@ def check(app, exception) -> None:
         return
     told = subprocess.run([sys.executable, __file__, str(file)], capture_output=True, text=True, encoding="utf-8")
     if told.returncode:
-        raise RuntimeError(f"gearmbs/kernels/asked.py: {told.stdout or told.stderr}")
+        raise RuntimeError(f"gearmbs/kernels/calls.py: {told.stdout or told.stderr}")
 
 
 if __name__ == "__main__":

@@ -87,7 +87,7 @@ def compile_all(
 def _compile_asked(report: Report) -> None:
     """Compile what is called, or linked, as only a list tells: it is little."""
     from gearmbs.kernels import cache
-    from gearmbs.kernels.asked import asked, linked
+    from gearmbs.kernels.calls import asked, linked
 
     for kernel, args in asked():
         if not cache.stored(kernel, "entry", args):

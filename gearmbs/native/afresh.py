@@ -137,16 +137,7 @@ def _correction(st, plan, factors, d):
 def _repair(functions, st, plan, factors, d, room, columns, rows_left, a, h):
     """Move the values onto the constraints over a vanishing step, where they are off; return 0 or a failure.
 
-    Parameters
-    ----------
-    functions, st, plan, factors
-        As of `gearmbs.dae.integrators.step`'s kernels: the problem's functions, the run, its pivots and their numbers.
-    d, a : structures
-        The driver of the library and what it holds for runs that start afresh.
-    room, columns, rows_left : ndarray
-        Scratch of the search for pivots.
-    h : float
-        Size of the step, s.
+    Its parameters are those of `_choose`.
     """
     n = st.y.shape[0]
     move = _correction(st, plan, factors, d)
@@ -215,14 +206,7 @@ def _euler_error(functions, st, plan, factors, d, h):
 def _settle_first_step(functions, st, plan, factors, d, room, columns, rows_left, a):
     """Choose the first step and its pivots; return 0 or a failure.
 
-    Parameters
-    ----------
-    functions, st, plan, factors
-        As of `gearmbs.dae.integrators.step`'s kernels: the problem's functions, the run, its pivots and their numbers.
-    d, a : structures
-        The driver of the library and what it holds for runs that start afresh.
-    room, columns, rows_left : ndarray
-        Scratch of the search for pivots.
+    Its parameters are those of `_choose`.
     """
     least = st.h
     h = 0.0 if a.first_given else min(start.FIRST_TRIED * (st.t_end - st.t), st.h_max)

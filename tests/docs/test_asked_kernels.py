@@ -5,8 +5,7 @@ import types
 import pytest
 
 from gearmbs.dae.equations.residual import residual
-from gearmbs.kernels.asked import ASKED, LINKED, LOOKED_UP, asked, linked, texts
-from gearmbs.kernels.calls import address
+from gearmbs.kernels.calls import ASKED, LINKED, LOOKED_UP, address, asked, linked, texts
 from gearmbs.kernels.jit import Kernel
 from tests.docs.support import DOCS
 

@@ -113,16 +113,15 @@ def turn_body(k, y, axes, turns, fval, kin):
     """Fill the kinematics of body k + 1 at the unknowns y, or where its motion has it."""
     turn, row = turns[k], kin[k + 1]
     phi, omega = turn_of(k, y, axes, turns, fval)
+    # A(phi) = a + b cos(phi) + c sin(phi), by Rodrigues' formula; v = omega x rho, before C is added to rho
     c, s = np.cos(phi), np.sin(phi)
     for q in range(9):
-        # A(phi) = a + b cos(phi) + c sin(phi), by Rodrigues' formula
         at = TURN_MATRIX + q
         row[KIN_A + q] = turn[at] + c * turn[at + 9] + s * turn[at + 18]
     for q in range(3):
         at = TURN_ARM + q
         row[KIN_R + q] = turn[at] + c * turn[at + 3] + s * turn[at + 6]
         row[KIN_W + q] = omega * turn[TURN_AXIS + q]
-    # v = omega x rho, before C is added to rho
     cross3(row, KIN_W, row, KIN_R, row, KIN_V)
     for q in range(3):
         row[KIN_R + q] += turn[TURN_POINT + q]
@@ -162,8 +161,7 @@ def lever(k, marker, turns, tab, s):
     body = tab.kin[tab.marker_body[marker]]
     for c in range(3):
         s[c] = body[KIN_R + c] + tab.frame[marker, T.MK_ARM + c] - turns[k, TURN_POINT + c]
-    # n . (r x F) = (n x r) . F: the lever of a force about the axis
-    cross3(turns[k], TURN_AXIS, s, 0, s, 3)
+    cross3(turns[k], TURN_AXIS, s, 0, s, 3)  # n . (r x F) = (n x r) . F: the lever of a force about the axis
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -382,8 +380,7 @@ def moment_entries(mode, row, wrench, rows, y, axes, turns, tab, slot, vals, k):
         sign = 1.0 - 2.0 * side
         lever(b, point, turns, tab, s)
         for c in range(3):
-            # the moment about the axis, (n x r) . F + n . N, as a weighted sum of the six rows
-            weights[c] = sign * s[3 + c] if has_force else 0.0
+            weights[c] = sign * s[3 + c] if has_force else 0.0  # (n x r) . F + n . N is a weighted sum of the six rows
             weights[3 + c] = sign * turns[b, TURN_AXIS + c] if has_torque else 0.0
         k = weighted_entries(
             mode, axes[b, AXIS_OMEGA], rows, weights, bodies, depends + 1, tab.extra_i[after - 1], after, y, axes,

@@ -427,12 +427,9 @@ class Simulator(Sampled, Restored, Guessed):
             )
 
     def begun(self) -> Begun:
-        """Return what stands behind the simulation, with its start evaluated and pivots chosen.
+        """Return what stands behind the simulation, with its start evaluated and pivots chosen; or raise `ModelError`.
 
-        Raises
-        ------
-        ModelError
-            If that fails, or something of it is in Python: functions, controllers, stops; or an input is on its way.
+        It is raised if that fails, or something is in Python: functions, controllers, stops; or an input is on its way.
         """
         held = [
             *(f"the function {one.name!r} of Python" for one in self._functions),
@@ -440,14 +437,12 @@ class Simulator(Sampled, Restored, Guessed):
             *(["controllers"] if self._controls else []),
             *(["stops"] if self._stops else []),
             *(["inputs on their way"] if self._settings.on_the_way(self.t) is not None else []),
+            *(["bodies that have been lumped (make it with lump=False)"] if self._members is not None else []),
         ]
-        if self._members is not None:
-            held.append("bodies that have been lumped (make it with lump=False)")
         if held:
             raise ModelError(f"simulator: it cannot go on without Python: it has {', '.join(held)}")
         if self._settings.waiting or self._settings.led:
-            # lines that have ended, too
-            self._apply(self.t)
+            self._apply(self.t)  # lines that have ended, too
         if not self._run.started and (failure := self._run.begin()) is not None:
             self._failed = failure[1]
         if self._failed is not None:
