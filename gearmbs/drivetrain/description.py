@@ -47,6 +47,10 @@ Each kind of part is a table of named tables::
     [loads.pump]
     kind = "pump"
 
+    [loads.brake]
+    shaft = "output"
+    torque = { input = "brake torque", unit = "N m", value = 20.0 }
+
     [sensors.laser]
     kind = "laser"
 
@@ -76,6 +80,7 @@ from gearmbs.drivetrain.planetary import SET_KEYS, STAGE_KEYS, PlanetaryStage, p
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.pair import GearPair
 from gearmbs.gears.spec import GearSpec, Material
+from gearmbs.mechanism.parts.inputs import make_input
 from gearmbs.schema.described import Described, check_keys, chosen, line, make, read_toml
 from gearmbs.schema.quantities import Measure, OneOf
 from gearmbs.units import Quantity
@@ -210,7 +215,7 @@ def _measured(data: Mapping[str, Any], key: str, measure: Measure) -> Any:
 def _part(group: str, name: str, table: Any, fault: FaultReader | None, folder: Path) -> Part:
     where = f"{group}.{name}"
     require(isinstance(table, Mapping), f"{where}: write a table, such as [{where}]")
-    settings = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+    settings = {key: _given(f"{where}.{key}", value) for key, value in table.items()}
     if group == "wheels":
         return _wheel(where, name, settings)
     if group == "meshes":
@@ -225,6 +230,19 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None, folder: 
     return _of_kind(
         where, chosen(kinds, str(settings.pop("kind", usual)), f"{where}: ", DrivetrainError), name, settings
     )
+
+
+def _given(where: str, value: Any) -> Any:
+    """Return a value of a part: a list as a tuple, a table ``{ input = "load", unit = "N m" }`` as an input."""
+    if isinstance(value, Mapping) and "input" in value:
+        known = ("input", "unit", "value")
+        check_keys(value, known, where, DrivetrainError, shown=repr)
+        require(isinstance(value.get("unit"), str), f'{where}: unit is missing; give that of the input, such as "N m"')
+        try:
+            return make_input(value["input"], value["unit"], value.get("value", 0.0))
+        except ValueError as error:
+            raise DrivetrainError(f"{where}: {error}") from None
+    return tuple(value) if isinstance(value, list) else value
 
 
 def _of_kind(where: str, kind: type[Part], name: str, settings: Mapping[str, Any]) -> Any:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 import gearmbs
-from gearmbs.dae.problem import INPUT, ModelError, Number
+from gearmbs.dae.problem import INPUT, PARAMETER, ModelError, Number
 from gearmbs.files import write_whole
 from gearmbs.kernels import PLAIN
 from gearmbs.mechanism.mechanism import Mechanism
@@ -26,8 +26,8 @@ from gearmbs.native.fmu import Description, variables_of, widths_of, write_fmu
 from gearmbs.native.kernels import Kernels
 from gearmbs.native.memory import Memory, Motions, memory_of
 from gearmbs.native.outputs import chosen_outputs
-from gearmbs.native.systems import SYSTEMS, System, c_compiler, system_of
-from gearmbs.wording import any_of
+from gearmbs.native.systems import SYSTEMS, System, c_compiler, check_processor, system_of
+from gearmbs.wording import any_of, did_you_mean, warn
 
 if TYPE_CHECKING:
     from gearmbs.mechanism.solve.keywords import SimulatorOptions
@@ -90,7 +90,8 @@ def export(
     target: str = "so",
     t_end: QuantityLike | None = None,
     name: str | None = None,
-    outputs: Sequence[Any] | None = None,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[Any] | str | None = None,
     processor: str | None = None,
     systems: Sequence[str] = ("linux",),
     compiler: str | None = None,
@@ -112,10 +113,14 @@ def export(
         Latest time that can be asked for, s; needed for a mechanism. The first step depends on it.
     name : str, optional
         Of the model and its library; default: that of the mechanism.
-    outputs : sequence, optional
-        Outputs of the mechanism by name, and quantities as `gearmbs.Mechanism.output` takes them, of one number each,
-        expressions among them.
-        Default: the outputs of the mechanism, or if it has none all motions, loads, diagnostics and reactions.
+    inputs : sequence of str, optional
+        Of an FMU, names of what can be set that are its inputs; all else are tunable parameters. Default: the inputs of
+        the mechanism.
+    outputs : sequence or str, optional
+        Outputs of the mechanism by name, expressions, and quantities as `gearmbs.Mechanism.output` takes them, of one
+        number each, or by the names that they have by default: "mesh.load.fx", "mesh.transmission_error".
+        Default: the outputs of the mechanism, or if it has none all motions, loads, diagnostics, transmission errors
+        and reactions. "all": both.
     processor : str, optional
         A name of LLVM's, or "native" for that of this machine. Default: any x86-64 with AVX2 and FMA, and of other
         machines this one.
@@ -140,9 +145,16 @@ def export(
     ------
     ModelError
         If there is no C compiler, something of the model is in Python, or an output cannot be told.
+
+    Warns
+    -----
+    UserWarning
+        If outputs that nobody has asked for by name are left out, with the reason for each.
     """
     if target not in TARGETS:
         raise ModelError(f"target = {target!r}; choose {any_of(list(TARGETS))}")
+    if inputs is not None and TARGETS[target] is None:
+        raise ModelError("inputs: a library takes all numbers alike; leave them out, or choose 'fmu2' or 'fmu3'")
     if arrays and target != "fmu3":
         raise ModelError(f"arrays: target {target!r} has none; leave it out, or choose 'fmu3'")
     if PLAIN:
@@ -159,6 +171,9 @@ def export(
         raise ModelError(
             f"systems = {list(systems)!r}: target {target!r} is for others; choose of {any_of(list(SYSTEMS))}"
         )
+    if processor is not None:
+        for one in asked.values():
+            check_processor(processor, one)
     commands = {name: c_compiler(compiler, one) for name, one in asked.items()}
     begun = model.begun()
     title = name or begun.system.mechanism.name
@@ -177,7 +192,8 @@ def export(
                 f"output {twice!r}: the name is given twice; leave one of the two out, or give it another name"
             )
         memory = memory_of(begun, numbers, told, kernels.number)
-    known = {key: (n.kind, n.unit, n.value(begun.run.state.rdata, begun.point.t)) for key, n in numbers.items()}
+    kinds = _kinds(numbers, inputs)
+    known = {key: (kinds[key], n.unit, n.value(begun.run.state.rdata, begun.point.t)) for key, n in numbers.items()}
     variables = variables_of(known, told, arrays)
     processors = {name: processor or one.processor for name, one in asked.items()}
     folder = Path(folder)
@@ -211,11 +227,25 @@ def export(
                 f"{asked[name].folders[version == '3.0']}/{stem}{asked[name].ending}": made[name] for name in made
             }
             libraries = dict.fromkeys(made, write_fmu(folder / f"{stem}.fmu", described, version, places))
+    if left:
+        reasons = "; ".join(f"{one!r}: {why}" for one, why in left.items())
+        warn(f"export: without outputs that a library cannot tell: {reasons}")
     units = {key: number.unit for key, number in numbers.items()}
     held = [key for key in begun.problem.numbers if key not in numbers]
     outputs_told = {one.name: one.unit for one in told}
     first = next(iter(libraries))
-    return Exported(folder, libraries[first], libraries, units, outputs_told, left, held, processors[first])
+    return Exported(folder, libraries[first], libraries, units, outputs_told, list(left), held, processors[first])
+
+
+def _kinds(numbers: dict[str, Number], inputs: Sequence[str] | None) -> dict[str, str]:
+    """Return of each number whether it is an input or a parameter of an FMU."""
+    if inputs is None:
+        return {name: number.kind for name, number in numbers.items()}
+    for name in inputs:
+        if name not in numbers:
+            meant = did_you_mean(name, numbers, shown=repr, otherwise=f"these can: {', '.join(numbers) or 'none'}")
+            raise ModelError(f"inputs: {name!r} cannot be set; {meant}")
+    return {name: INPUT if name in inputs else PARAMETER for name in numbers}
 
 
 def _ending(name: str, asked: dict[str, System]) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,16 +12,23 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.accelerations import FORCE_RECORD
 from gearmbs.dae.equations.expressions import ExpressionError
-from gearmbs.dae.equations.expressions.tape import Tape
+from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.bound import NAMES
 from gearmbs.mechanism.compile import scope_of, starting_angles
 from gearmbs.mechanism.language.library import compile_expression
+from gearmbs.mechanism.parts.bodies import Body, Marker
+from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.parts.joints import kinds_with_angle, kinds_with_displacement
+from gearmbs.mechanism.parts.modal import ModalBody
+from gearmbs.mechanism.solve.carriers import error_tape, own_marker, pair_of, unturned
 from gearmbs.mechanism.solve.simulator import Begun, Simulator
+from gearmbs.mechanism.solve.told import PAIRED, VECTORIAL
 from gearmbs.native.asked import Counted, Told
-from gearmbs.native.series import FORCE, LOADS, MOMENT, NUMBER, POSE, SOLUTION, UNKNOWN
+from gearmbs.native.series import FORCE, LOADS, MOMENT, NUMBER, POSE, SOLUTION, STRAYED, UNKNOWN
+from gearmbs.wording import did_you_mean
 
 AXES = ("x", "y", "z")
 WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
@@ -35,6 +44,19 @@ MODAL = {"modal_coordinates": (0, "1"), "modal_velocities": (1, "1/s")}
 """Quantities of bodies that deform, by the number of a mode."""
 OF_JOINT = ("joint_angle", "joint_displacement", "joint_rate")
 """Quantities of joints that are told as expressions."""
+OF_MARKER = {
+    "marker_position": (op.DISPLACEMENT, "m"),
+    "marker_velocity": (op.VELOCITY, "m/s"),
+    "marker_acceleration": (op.ACCELERATION, "m/s^2"),
+}
+"""Quantities of markers with three components: the measure, and the unit."""
+ERROR = "transmission_error"
+DEFLECTION = "deflection"
+EVALUATE = "evaluate"
+OTHERS = ("orientation", "reaction", "reaction_force", "load", "diagnostics", "contact", DEFLECTION, ERROR, "state",
+          "unknown", "constraint_violation")  # fmt: skip
+ALL = "all"
+"""Stands for every output: those of the mechanism, and what is told of one that has none."""
 
 
 class Finder:
@@ -72,6 +94,9 @@ class Finder:
         """
         what, *rest = asked
         try:
+            if what == EVALUATE:
+                (text,) = rest
+                return self.evaluate(name, str(text))
             if what in OF_BODY:
                 record, first, unit = OF_BODY[what]
                 body, component = rest
@@ -104,13 +129,26 @@ class Finder:
             if what in OF_JOINT:
                 (joint,) = rest
                 return self._of_joint(name, what, joint)
+            if what in OF_MARKER:
+                marker, component = rest
+                return self._of_marker(name, what, marker, _component(AXES, component))
+            if what == DEFLECTION:
+                marker, component = rest
+                return self._deflection(name, marker, _component(WRENCH, component))
+            if what == ERROR:
+                (mesh,) = rest
+                return self._error(name, mesh)
             if what == "state":
                 (state,) = rest
                 return Told(name, "1", ((UNKNOWN, int(self.problem.idata[T.H_Z]) + self.states.index(state)),))
+            if what == "unknown":
+                (unknown,) = rest
+                return Told(name, "1", ((UNKNOWN, self._index(self.problem.names, unknown, "unknown")),))
+            if what == "constraint_violation" and not rest:
+                return Told(name, "1", ((STRAYED, 0),))
         except (ValueError, TypeError) as error:
             raise ModelError(f"output {name!r}: {tuple(asked)!r} cannot be told: {error}") from None
-        others = ("orientation", "reaction", "reaction_force", "load", "diagnostics", "state")
-        known = ", ".join([*OF_BODY, *MODAL, *OF_JOINT, *others])
+        known = ", ".join([*OF_BODY, *MODAL, *OF_JOINT, *OF_MARKER, *OTHERS])
         raise ModelError(f"output {name!r}: a library does not tell {what!r}; it tells {known}")
 
     def evaluate(self, name: str, text: str) -> Told:
@@ -163,6 +201,60 @@ class Finder:
         }[what]
         return self.evaluate(name, text)._replace(unit=unit)
 
+    @cached_property
+    def _marker_rows(self) -> list[int]:
+        """Rows of the kinematics table of all markers, those that outputs have needed among them."""
+        return list(scope_of(self.mechanism)[1].marker_body)
+
+    def _place_of(self, marker: Marker) -> int:
+        """Return the number of a marker in the tables of expressions."""
+        m = self.mechanism
+        every = [one for body in (m.ground, *m.bodies.values()) for one in body.markers]
+        return next(k for k, one in enumerate(every) if one is marker)
+
+    def _marker(self, marker: Any) -> Marker:
+        """Return a marker, by its name or of a body's own frame."""
+        m = self.mechanism
+        if isinstance(marker, Marker):
+            return marker
+        if isinstance(marker, Body):
+            # see `needed_markers`
+            return own_marker(marker, _frame_name(marker), marker.marker)
+        every = [one for body in (m.ground, *m.bodies.values()) for one in body.markers]
+        found = [one for one in every if one.name == marker]
+        if len(found) > 1:
+            raise ValueError(
+                f"marker {marker!r} is on {' and '.join(one.body.name for one in found)}; give the marker itself"
+            )
+        return every[self._index([one.name for one in every], marker, "marker")]
+
+    def _of_marker(self, name: str, what: str, marker: Any, axis: int) -> Told:
+        code, unit = OF_MARKER[what]
+        b = TapeBuilder(self._marker_rows)
+        found = b.vector(code, self._place_of(self._marker(marker)), op.GLOBAL, op.GLOBAL, op.GLOBAL, axis)
+        return Told(name, unit, (), b.finish(found))
+
+    def _deflection(self, name: str, marker: Any, component: int) -> Told:
+        """Return how far a marker of a modal body is displaced or turned: its shapes times the modal coordinates."""
+        found = self._marker(marker)
+        if not isinstance(found.body, ModalBody):
+            raise ValueError(f"marker {found.name!r} is on '{found.body.name}', which does not deform")
+        shapes, c = found.body.shape_at(found)[component // 3], component % 3
+        terms = [f"{float(one)!r}*MODAL({found.body.name}, {k})" for k, one in enumerate(shapes[:, c], start=1)]
+        return self.evaluate(name, " + ".join(terms))._replace(unit="m" if component < 3 else "rad")
+
+    def _error(self, name: str, mesh: str) -> Told:
+        """Return the transmission error of a mesh, as `gearmbs.Solution.transmission_error` tells it."""
+        element = _meshes(self.mechanism)[self._mesh(mesh)]
+        turning = [element.i, element.j]
+        still = [unturned(self.mechanism, marker, element) for marker in turning]
+        own, others = ([self._place_of(marker) for marker in markers] for markers in (turning, still))
+        return Told(name, "m", (), error_tape(self._marker_rows, own, others, element))
+
+    def _mesh(self, mesh: str) -> str:
+        known = list(_meshes(self.mechanism))
+        return known[self._index(known, mesh, "gear contact")]
+
     def _modal_place(self, body: str, mode: int, derivative: int) -> int:
         """Return where a modal coordinate or its rate stands behind the poses of all bodies."""
         names, modes = self.model.names.bodies, self.model.modes
@@ -203,20 +295,64 @@ class Finder:
             raise ValueError(f"there is no {what} {name!r}; there are {', '.join(names) or 'none'}")
         return list(names).index(name)
 
-    def everything(self) -> list[Told]:
-        """Return motions and modes of all bodies, loads and diagnostics of all elements, reactions and states."""
+    def names(self) -> dict[str, tuple[Any, ...]]:
+        """Return names of motions and modes of all bodies, loads, diagnostics, transmission errors, reactions, states.
+
+        With each stands what `find` takes.
+        """
         names = self.model.names
         asked: list[tuple[str, ...]] = []
         for k, body in enumerate(names.bodies, start=1):
             asked += [(what, body, axis) for what in OF_BODY for axis in AXES]
             asked += [(what, body, str(mode)) for what in MODAL for mode in range(self.model.modes[k])]
+        meshes = _meshes(self.mechanism)
         for k, element in enumerate(names.forces):
             asked += [("load", element, component) for component in WRENCH]
             asked += [("diagnostics", element, d.name) for d in self.model.diagnostics[k]]
+            asked += [(ERROR, element)] if element in meshes else []
         for joint in self.model.rows_of_joint:
             asked += [("reaction", joint, component) for component in WRENCH]
         asked += [("state", state) for state in self.states]
-        return [self.find(f"{of}.{'.'.join((what, *rest))}", (what, of, *rest)) for what, of, *rest in asked]
+        return {f"{of}.{'.'.join((what, *rest))}": (what, of, *rest) for what, of, *rest in asked}
+
+    def parts(self, output: Output) -> list[tuple[str, tuple[Any, ...]]]:
+        """Return the names of the numbers that an output of the mechanism is, and what `find` takes for each."""
+        assert isinstance(output.what, tuple)
+        what, *rest = output.what
+        components: Sequence[Any] = ()
+        if output.component is None and len(rest) == 1:
+            if what in (*PAIRED, DEFLECTION):
+                components = WRENCH
+            elif what in VECTORIAL:
+                components = AXES
+            elif what in MODAL and rest[0] in self.model.names.bodies:
+                components = range(self.model.modes[self.model.names.bodies.index(rest[0]) + 1])
+            elif what in ("diagnostics", "contact") and rest[0] in self.model.names.forces:
+                components = [d.name for d in self.model.diagnostics[self.model.names.forces.index(rest[0])]]
+        if not components:
+            return [(output.name, output.what)]
+        return [(f"{output.name}.{one}", (what, *rest, one)) for one in components]
+
+
+def _meshes(mechanism: Any) -> dict[str, Any]:
+    """Return the gear contacts and ideal meshes of a mechanism by name."""
+    return {name: element for name, element in mechanism.elements.items() if pair_of(element) is not None}
+
+
+def _frame_name(body: Body) -> str:
+    return f"{body.name} frame of outputs"
+
+
+def needed_markers(mechanism: Any, asked: Sequence[Any]) -> None:
+    """Make the markers that an output is told by, which expressions count along with all others."""
+    what, *rest = asked
+    if what in OF_MARKER and isinstance(rest[0], Body):
+        own_marker(rest[0], _frame_name(rest[0]), rest[0].marker)
+    elif what == ERROR and (element := _meshes(mechanism).get(rest[0])) is not None:
+        with contextlib.suppress(ModelError):
+            # of a wheel that is carried around nothing is told
+            for marker in (element.i, element.j):
+                unturned(mechanism, marker, element)
 
 
 def _component(names: Sequence[str], component: Any) -> int:
@@ -226,51 +362,60 @@ def _component(names: Sequence[str], component: Any) -> int:
 
 
 def chosen_outputs(
-    simulator: Simulator, begun: Begun, numbers: Sequence[str], outputs: Sequence[Any] | None
-) -> tuple[list[Told], list[str]]:
-    """Return the outputs of an export, and the names of those of the mechanism that are left out.
+    simulator: Simulator, begun: Begun, numbers: Sequence[str], outputs: Sequence[Any] | str | None
+) -> tuple[list[Told], dict[str, str]]:
+    """Return the outputs of an export, and why some of those that nobody has asked for by name are left out.
 
     Parameters
     ----------
     simulator, begun, numbers
         As of `Finder`.
-    outputs : sequence, optional
-        Names of outputs of the mechanism, and quantities as `Mechanism.output` takes them. Default: all outputs of the
-        mechanism that can be told, or everything if it has none.
+    outputs : sequence or str, optional
+        Names of outputs of the mechanism or of `Finder.names`, expressions, and quantities as `Mechanism.output` takes
+        them; or `ALL`. Default: all outputs of the mechanism that can be told, or everything if it has none.
 
     Raises
     ------
     ModelError
         For one that is asked for and cannot be told.
     """
-    finder, named, left = Finder(simulator, begun, numbers), begun.system.mechanism.outputs, []
-    if outputs is None and not named:
-        return finder.everything(), []
-    for name in named if outputs is None else outputs:
-        if isinstance(name, str) and name in named:
-            # sensors make their markers, which all expressions count along with theirs
-            _ = named[name].text
-    if outputs is not None:
-        return [_asked(finder, named, item) for item in outputs], []
-    found = []
-    for name in named:
+    finder, named = Finder(simulator, begun, numbers), begun.system.mechanism.outputs
+    names = finder.names()
+    given = outputs is not None and outputs != ALL
+    items: list[Any]
+    if not given:
+        items = [*named, *(names if outputs == ALL or not named else ())]
+    else:
+        items = [outputs] if isinstance(outputs, str) else list(outputs or ())
+    asked = [_asked(finder, named, names, item) for item in items]
+    for parts in asked:
+        for _, what in parts:
+            needed_markers(finder.mechanism, what)
+    found: list[Told] = []
+    left: dict[str, str] = {}
+    for item, parts in zip(items, asked, strict=True):
         try:
-            found.append(_asked(finder, named, name))
-        except ModelError:
-            left.append(name)
+            found += [finder.find(name, what) for name, what in parts]
+        except ModelError as error:
+            if given:
+                raise
+            left[item] = str(error).removeprefix(f"output {parts[0][0]!r}: ")
     return found, left
 
 
-def _asked(finder: Finder, named: Any, item: Any) -> Told:
-    if not isinstance(item, str) and item[0] == "evaluate":
-        return finder.evaluate(str(item[1]), str(item[1]))
+def _asked(finder: Finder, named: Any, names: Any, item: Any) -> list[tuple[str, tuple[Any, ...]]]:
+    """Return the names of the numbers that an item stands for, and what `Finder.find` takes for each."""
     if not isinstance(item, str):
-        return finder.find(".".join(map(str, item)), item)
-    if item not in named:
-        raise ModelError(f"output {item!r}; the outputs are {', '.join(named) or 'none'}")
-    made = named[item]
-    if made.text is not None:
-        return finder.evaluate(item, made.text)
-    if made.what[0] == "evaluate":
-        return finder.evaluate(item, str(made.what[1]))
-    return finder.find(item, made.what)
+        name = str(item[1]) if item[0] == EVALUATE else ".".join(str(getattr(one, "name", one)) for one in item)
+        return [(name, tuple(item))]
+    if item in named:
+        # sensors make their markers, which all expressions count along with theirs
+        made = named[item]
+        return [(item, (EVALUATE, made.text))] if made.text is not None else finder.parts(made)
+    if item in names:
+        return [(item, names[item])]
+    if "(" in item:
+        return [(item, (EVALUATE, item))]
+    known = [*named, *names]
+    meant = did_you_mean(item, known, shown=repr, otherwise=f"the outputs are {', '.join(named) or ', '.join(names)}")
+    raise ModelError(f"output {item!r}: there is none of this name; {meant}")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import platform
+import re
 import shutil
+import subprocess
 import sys
 from typing import NamedTuple
 
 from gearmbs.dae.problem import ModelError
-from gearmbs.wording import any_of
+from gearmbs.wording import any_of, did_you_mean
 
 PORTABLE = {"x86_64": "x86-64-v3", "AMD64": "x86-64-v3"}
 """Processors that libraries are made for, by the kind of machine: those of the last ten years, with fused products."""
@@ -70,11 +72,53 @@ def system_of(name: str) -> System:
         If there is none.
     """
     if name not in SYSTEMS:
-        raise ModelError(f"systems: {name!r}; choose {any_of(list(SYSTEMS))}")
+        meant = did_you_mean(name, SYSTEMS, otherwise=f"choose {any_of(list(SYSTEMS))}")
+        raise ModelError(f"systems: there is no {name!r}; {meant}")
     found = SYSTEMS[name]
     if not found.triple:
         return found._replace(processor=PORTABLE.get(platform.machine(), "native"))
     return found
+
+
+NATIVE = "native"
+"""Stands for the processor of this machine."""
+LEVELS = {"x86_64": ("x86-64", "x86-64-v2", "x86-64-v3", "x86-64-v4"), "aarch64": ("generic", "cortex-a72")}
+"""Processors that messages name, by the kind of machine."""
+_ASK = """
+import sys
+import llvmlite.binding as llvm
+llvm.initialize_all_targets()
+llvm.initialize_all_asmprinters()
+triple = sys.argv[1] or llvm.get_process_triple()
+machine = llvm.Target.from_triple(triple).create_target_machine(cpu=sys.argv[2])
+module = llvm.parse_assembly("define double @f(double %x) { ret double %x }")
+module.triple = triple
+machine.emit_object(module)
+"""
+"""Of a processor that it does not know LLVM writes so and takes another, or ends the process: not this one."""
+
+
+def processors_of(system: System) -> list[str]:
+    """Return the names that LLVM has for processors of a system's kind, those of others of its family among them."""
+    return re.findall(r"^  (\S+) +- Select the", _asked_of_llvm(system, "help").stderr, re.MULTILINE)
+
+
+def check_processor(name: str, system: System) -> None:
+    """Raise a ModelError if a system has no processor of a name."""
+    machine = system.triple.partition("-")[0] or platform.machine()
+    usual = LEVELS.get(machine, ())
+    if name in (NATIVE, *usual):
+        return
+    done = _asked_of_llvm(system, name)
+    if done.returncode or "not a recognized processor" in done.stderr:
+        known = [one for one in (NATIVE, *usual, *processors_of(system)) if one != name]
+        meant = did_you_mean(name, known, otherwise=f"choose {any_of(list(dict.fromkeys(known)))}", count=3)
+        raise ModelError(f"processor = {name!r}: {machine} has none of this name that it runs on; {meant}")
+
+
+def _asked_of_llvm(system: System, processor: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", _ASK, system.triple, processor]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def c_compiler(given: str | None, system: System = SYSTEMS["linux"]) -> list[str]:

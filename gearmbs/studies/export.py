@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gearmbs._command import guarded, kind_of
+from gearmbs.wording import any_of, did_you_mean
 
 if TYPE_CHECKING:
     from gearmbs.gears import GearPair
@@ -117,20 +119,70 @@ def write_tables(file: Path, folder: Path, target: str, torques: str | None) -> 
     return written
 
 
+SHOW = "list"
+"""Stands for a target or a processor where what there is is asked for."""
+TARGETS = {
+    "so": "a shared library with a C header",
+    "fmu2": "an FMU for Co-Simulation by FMI 2.0",
+    "fmu3": "the same by FMI 3.0",
+    "csv": "tables of transmission error, stiffness and force of the meshes",
+    "modelica": "a Modelica package of them",
+}
+
+
+def items_of(text: str | None) -> list[str] | None:
+    """Return what stands between commas, those in brackets and quotes left alone.
+
+    Examples
+    --------
+    >>> items_of('speed, mesh.load.fx, DX("a, b", G)')
+    ['speed', 'mesh.load.fx', 'DX("a, b", G)']
+    """
+    if text is None:
+        return None
+    found = re.findall(r'(?:"[^"]*"|\([^()]*(?:\([^()]*\)[^()]*)*\)|[^,("])+', text)
+    return [part.strip() for part in found if part.strip()]
+
+
+def _listed(target: str, processor: str | None, systems: Sequence[str]) -> list[str]:
+    """Return the lines of what there is, if targets or processors are asked for; refuse a target that there is not."""
+    if target == SHOW:
+        return [f"{name:<9} {what}" for name, what in TARGETS.items()]
+    if target not in TARGETS:
+        meant = did_you_mean(target, TARGETS, shown=repr, otherwise=f"choose {any_of(map(repr, TARGETS))}")
+        raise ValueError(f"--target {target!r}: there is none of this name; {meant}")
+    if processor != SHOW:
+        return []
+    from gearmbs.native.systems import NATIVE, processors_of, system_of
+
+    return [NATIVE, *dict.fromkeys(one for name in systems for one in processors_of(system_of(name)))]
+
+
 def export(
-    file: Annotated[Path, typer.Argument(help="Case, planetary set or drivetrain in TOML.")],
+    file: Annotated[Path | None, typer.Argument(help="Case, planetary set or drivetrain in TOML.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder; default: beside the file.")] = None,
     target: Annotated[
         str,
         typer.Option(
             help="so: a shared library with a C header; fmu2, fmu3: an FMU by FMI 2.0 or 3.0; csv, modelica: tables of "
-            "transmission error, stiffness and force of the meshes."
+            "transmission error, stiffness and force of the meshes; list: print these."
         ),
     ] = "so",
     t_end: Annotated[str | None, typer.Option(help='Latest time, e.g. "2 s"; default: the end of the record.')] = None,
     name: Annotated[str | None, typer.Option(help="Of the library; default: that of the mechanism.")] = None,
+    inputs: Annotated[
+        str | None, typer.Option(help="Of an FMU, what can be set that is an input, with commas between.")
+    ] = None,
+    outputs: Annotated[
+        str | None,
+        typer.Option(
+            help='What is told, with commas between: outputs of the file, "mesh.transmission_error", "pin.reaction.fx" '
+            "and their like, expressions; all: everything. Default: outputs of the file, without any everything."
+        ),
+    ] = None,
     processor: Annotated[
-        str | None, typer.Option(help="A name of LLVM's, or native; default: any x86-64 with AVX2 and FMA.")
+        str | None,
+        typer.Option(help="A name of LLVM's, or native; default: any x86-64 with AVX2 and FMA; list: print them."),
     ] = None,
     systems: Annotated[
         str, typer.Option(help="linux, windows, linux-arm64, with commas between; an FMU is for all of them.")
@@ -145,25 +197,32 @@ def export(
     A C compiler is needed here alone, for tables none.
     """
     with guarded():
+        if lines := _listed(target, processor, items_of(systems) or ()):
+            typer.echo("\n".join(lines))
+            return
+        if file is None:
+            raise ValueError("give a file that describes a case, a planetary set or a drivetrain")
         if target in TABLES:
+            if inputs is not None or outputs is not None:
+                raise ValueError(f"--inputs and --outputs are of libraries and FMUs; leave them out for {target}")
             for path in write_tables(file, out or file.with_suffix(""), target, torques):
                 typer.echo(f"wrote {path}")
             return
         if torques is not None:
             raise ValueError(f"--torques is of tables; give --target {' or '.join(TABLES)} with it, or leave it out")
         from gearmbs.native import export as exported
+        from gearmbs.native.outputs import ALL
 
         mechanism, end, options = described_model(file)
         folder = out or file.with_suffix("")
         made = exported(
-            mechanism, folder, target=target, t_end=t_end or end, name=name, processor=processor,
-            systems=[part.strip() for part in systems.split(",") if part.strip()], arrays=arrays, **options,
+            mechanism, folder, target=target, t_end=t_end or end, name=name, inputs=items_of(inputs),
+            outputs=ALL if outputs == ALL else items_of(outputs), processor=processor,
+            systems=items_of(systems) or (), arrays=arrays, **options,
         )  # fmt: skip
         for what, named in (("set", made.numbers), ("told", made.outputs)):
             typer.echo(f"can be {what}: {len(named)}")
         if made.held:
             typer.echo(f"note: these prescribe motions and keep their values: {', '.join(made.held)}", err=True)
-        if made.left_out:
-            typer.echo(f"note: left out, which a library does not tell: {', '.join(made.left_out)}", err=True)
         for library in dict.fromkeys(made.libraries.values()):
             typer.echo(f"wrote {library}")

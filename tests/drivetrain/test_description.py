@@ -149,3 +149,22 @@ def test_stepped_shafts_carry_their_own_parts_and_change():
     assert train.changed("s", radius="15 mm").changed("s", diameter="40 mm").part("s", Shaft).radius is None
     with pytest.raises(DrivetrainError, match=says("0.3", "0.2", "length or sections")):
         Shaft(name="s", length="300 mm", sections=STEPS)
+
+
+def test_values_that_are_set_from_outside_are_tables(tmp_path):
+    """Torque and speed of the file as inputs: those of Python, which a mechanism has by name."""
+    path = tmp_path / "stage.toml"
+    given = TEXT.replace('torque = "300 N m"', 'torque = { input = "brake torque", unit = "N m", value = 300.0 }')
+    given = given.replace('speed = "1500 rpm"', 'speed = "1500 rpm"\nreference = { input = "speed", unit = "rad/s" }')
+    path.write_text(given)
+    m = read_description(path).train.build()
+    assert m.inputs["brake torque"].start == 300.0
+    assert (m.inputs["speed"].unit, m.inputs["speed"].start) == ("rad/s", 0.0)
+    for old, new, words in (
+        ('unit = "N m", ', "", ("torque", "unit", "missing")),
+        ('unit = "N m"', 'unit = "N"', ("brake torque", "in N", "torque")),
+        ("value = 300.0", "start = 300.0", ("loads.brake.torque", "start", "value")),
+    ):
+        path.write_text(given.replace(old, new))
+        with pytest.raises(DrivetrainError, match=says(*words)):
+            read_description(path).train.build()

@@ -26,9 +26,38 @@ def test_a_case_becomes_a_library(tmp_path):
     assert library.end_time() == pytest.approx(0.04)
     instance = Instance(library)
     instance.advance(0.001)
-    refused = CliRunner().invoke(app, ["export", str(file), "--target", "exe"])
+    chosen = ["--target", "fmu3", "--inputs", "load.torque", "--outputs", "mesh.transmission_error, ACCX(gear 1.cm)"]
+    refused = CliRunner().invoke(app, ["export", str(file), *chosen])
     assert refused.exit_code == 1
-    assert "'exe'" in refused.output
+    assert "ACCX(gear 1.cm)" in refused.output
+    chosen[-1] = 'mesh.transmission_error, mesh.load.fx, FX("mesh.I", "mesh.J") + 0*WZ("mesh.I", "mesh.J")'
+    done = CliRunner().invoke(app, ["export", str(file), *chosen])
+    assert done.exit_code == 0, done.output
+    assert "can be told: 3" in done.output
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["no.toml", "--target", "fmi2"], ["'fmi2'", "did you mean 'fmu2'"]),
+        (["no.toml", "--target", "exe"], ["'exe'", "'modelica'"]),
+        (["no.toml", "--target", "csv", "--outputs", "a"], ["--outputs", "leave them out"]),
+        ([], ["give a file"]),
+    ],
+)
+def test_what_is_refused(given, told):
+    refused = CliRunner().invoke(app, ["export", *given])
+    assert refused.exit_code == 1
+    for text in told:
+        assert text in refused.output
+
+
+def test_what_there_is():
+    targets = CliRunner().invoke(app, ["export", "--target", "list"])
+    assert targets.exit_code == 0
+    assert [line.split()[0] for line in targets.output.splitlines()] == ["so", "fmu2", "fmu3", "csv", "modelica"]
+    processors = CliRunner().invoke(app, ["export", "--processor", "list", "--systems", "linux-arm64"])
+    assert {"native", "cortex-a72"} <= set(processors.output.split())
 
 
 @pytest.mark.slow

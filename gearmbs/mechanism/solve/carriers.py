@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from gearmbs.dae.equations.expressions import opcodes as op
+from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.forces.springs import LineSpring, MatrixForce
 from gearmbs.mechanism.parts.bodies import Body, Marker
@@ -216,9 +218,9 @@ def how_to_name(mesh: str, carrier: str = "body") -> str:
     )
 
 
-def unturned(mechanism: Meshing, marker: Marker, element: Any) -> Marker:
+def unturned(mechanism: Meshing, marker: Marker, element: Any, carrier: Body | None = None) -> Marker:
     """Return the marker of the ground, or a carrier, from which a wheel's turn counts, made if it is not there yet."""
-    body, axes = carrier_of(mechanism, element), marker.global_orientation()
+    body, axes = carrier or carrier_of(mechanism, element), marker.global_orientation()
     name = f"{marker.name} plant {'ground' if body.is_ground else 'carrier'}"
     if isinstance(body, ModalBody):
         # its frame, which goes through no node
@@ -238,6 +240,28 @@ def count_from_here(mechanism: Meshing) -> None:
             continue
         for marker in (element.i, element.j):
             unturned(mechanism, marker, element)
+
+
+def error_tape(bodies: Sequence[int], turning: Sequence[int], still: Sequence[int], element: Any) -> Tape:
+    """Return r_b1 phi_1 + s r_b2 phi_2 of a mesh as an expression, of all that differ by base pitches nearest to zero.
+
+    Parameters
+    ----------
+    bodies : sequence of int
+        Row of the kinematics table of every marker.
+    turning, still : sequence of int
+        Markers of the two wheels, and those from which their turns about the axes z count.
+    element
+        The mesh.
+    """
+    b, total = TapeBuilder(bodies), -1
+    *both, pitch = levers(element)
+    for i, j, lever in zip(turning, still, both, strict=True):
+        angle = b.binary(op.ATAN2, b.cosine(i, 0, j, 1), b.cosine(i, 0, j, 0))
+        way = b.binary(op.MUL, b.constant(lever), angle)
+        total = way if total < 0 else b.binary(op.ADD, total, way)
+    pitches = b.unary(op.ANINT, b.binary(op.DIV, total, b.constant(pitch)))
+    return b.finish(b.binary(op.SUB, total, b.binary(op.MUL, b.constant(pitch), pitches)))
 
 
 def pair_of(element: Any) -> Any:

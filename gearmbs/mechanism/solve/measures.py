@@ -14,6 +14,7 @@ from gearmbs.dae.equations.loads.time_functions import evaluate
 from gearmbs.dae.model.model import Names
 from gearmbs.dae.problem import ModelError
 from gearmbs.dae.results.frames import (
+    KIN_PLACES,
     body_motion,
     elastic_motion,
     frame_motion,
@@ -27,7 +28,7 @@ from gearmbs.mechanism.parts.elements import State
 from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody
-from gearmbs.mechanism.solve.carriers import CARRIED, carrier_of, how_to_name, levers, pair_of
+from gearmbs.mechanism.solve.carriers import CARRIED, carrier_of, error_tape, how_to_name, pair_of, unturned
 from gearmbs.units import shown
 
 if TYPE_CHECKING:
@@ -173,24 +174,28 @@ class Measures:
             marker = Marker(f"{marker.name}.frame", marker, np.zeros(3), np.eye(3))
         if not isinstance(marker, Marker):
             raise ModelError(f"{marker!r} is not a marker, a body or the name of a marker")
+        host, local = self._frame(marker)
+        axes = host[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
+        out, arm = host[:, :KIN_AXES].copy(), axes @ local
+        out[:, KIN_R : KIN_R + 3] += arm
+        out[:, KIN_V : KIN_V + 3] += np.cross(host[:, KIN_W : KIN_W + 3], arm)
+        out[:, KIN_A : KIN_A + 9] = (axes @ marker.orientation).reshape(-1, 9)
+        return out
+
+    def _frame(self, marker: Marker) -> tuple[np.ndarray, np.ndarray]:
+        """Return the motion of what a marker is fixed to, columns ``KIN_*``, shape (m, 27), and its place there, m."""
         body, local = marker.body, marker.position - marker.body.com
-        out = np.zeros((self.solution.t.size, KIN_AXES))
         if body.is_ground:
-            out[:, KIN_R : KIN_R + 3], out[:, KIN_A : KIN_A + 9] = local, marker.orientation.ravel()
-            return out
+            still = np.zeros((self.solution.t.size, KIN_PLACES))
+            still[:, KIN_A : KIN_A + 9] = np.eye(3).ravel()
+            return still, local
         found = self.solution.evaluated
         number = found.model.names.bodies.index(body.name) + 1
         host = body_motion(found, number)
         if isinstance(body, ModalBody):
             host, _ = elastic_motion(host, None, found.modal(number), local, *body.shape_at(marker))
             local = np.zeros(3)
-        axes = host[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
-        arm = axes @ local
-        out[:, KIN_R : KIN_R + 3] = host[:, KIN_R : KIN_R + 3] + arm
-        out[:, KIN_V : KIN_V + 3] = host[:, KIN_V : KIN_V + 3] + np.cross(host[:, KIN_W : KIN_W + 3], arm)
-        out[:, KIN_W : KIN_W + 3] = host[:, KIN_W : KIN_W + 3]
-        out[:, KIN_A : KIN_A + 9] = (axes @ marker.orientation).reshape(-1, 9)
-        return out
+        return host, local
 
     def _find(self, name: str) -> Marker:
         bodies = (self.mechanism.ground, *self.mechanism.bodies.values())
@@ -217,26 +222,30 @@ class Measures:
         meshes = {n: e for n, e in self.mechanism.elements.items() if pair_of(e) is not None}
         if name not in meshes:
             raise KeyError(f"mesh {name!r}; the gear contacts are {', '.join(meshes) or 'none'}")
-        element, total = meshes[name], np.zeros(self.solution.t.size)
-        *both, pitch = levers(element)
-        carrier = self.mechanism.ground
-        if name in self.mechanism.carriers or name not in self.looked_at:
-            carrier = carrier_of(self.mechanism, element)
+        from gearmbs.mechanism.language.series import evaluate_series
+
+        element, m, t = meshes[name], self.mechanism, self.solution.t
+        carrier = m.ground
+        if name in m.carriers or name not in self.looked_at:
+            carrier = carrier_of(m, element)
         if carrier.is_ground:
             self.looked_at.add(name)
             self._check_axes(element)
-        for marker, lever in zip((element.i, element.j), both, strict=True):
-            first, now = marker.global_orientation(), self._axes(marker)[:, :, 0]
-            # term by term: a product of matrices rounds otherwise for one instant than for many
-            if carrier.is_ground:
-                x, y = (now[:, 0] * first[0, c] + now[:, 1] * first[1, c] + now[:, 2] * first[2, c] for c in (0, 1))
-            else:
-                frame = self._motion(carrier)[:, KIN_A : KIN_A + 9].reshape(-1, 3, 3)
-                on = carrier.orientation.T @ first
-                carried = [[sum(frame[:, r, k] * on[k, c] for k in range(3)) for r in range(3)] for c in (0, 1)]
-                x, y = (now[:, 0] * one[0] + now[:, 1] * one[1] + now[:, 2] * one[2] for one in carried)
-            total += lever * np.arctan2(y, x)
-        return total - pitch * np.round(total / pitch)
+        turning = [element.i, element.j]
+        with markers_kept((m.ground, *m.bodies.values())):
+            markers = [*turning, *(unturned(m, marker, element, carrier) for marker in turning)]
+            kin = np.stack([self._frame(marker)[0] for marker in markers], axis=1)
+        rows = np.arange(len(markers))
+        tape = error_tape(rows.tolist(), (0, 1), (2, 3), element)
+        frames = np.array([[*marker.position, *marker.orientation.ravel()] for marker in markers])
+        # neither accelerations, jumps, unknowns nor counted angles are in it
+        none, out = np.zeros(0), np.zeros(t.size)
+        evaluate_series(
+            tape.ints, tape.floats, t, np.zeros(t.size, dtype=bool), kin, np.zeros((t.size, len(markers), 6)), rows,
+            frames, np.zeros((t.size, 0)), np.zeros((2, t.size, 0)), np.zeros((0, t.size)), none,
+            np.zeros(tape.work_size), out,
+        )  # fmt: skip
+        return out
 
     def _check_axes(self, element: Any) -> None:
         """Refuse wheels whose line of centres has turned: of carried axes absolute angles are no transmission error."""
