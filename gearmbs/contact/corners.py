@@ -1,4 +1,7 @@
-"""Tip corners at work: those of one tooth pair in the sections of a strip, and their gaps to the mate's flank."""
+"""Tip corners at work: those of one tooth pair in the sections of a strip, and their gaps to the mate's flank.
+
+What a gap is stands in `gearmbs.contact.gaps.definitions`; loops as in `sections`.
+"""
 
 from __future__ import annotations
 
@@ -6,30 +9,28 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import roll_under_corner
-from gearmbs.contact.helical_sections import edge_normals, edge_sections
+from gearmbs.contact.gaps import derived as D
 from gearmbs.contact.places import level, level_corner
-from gearmbs.contact.records import kernel
+from gearmbs.contact.records import inlined, kernel
 from gearmbs.contact.sections import (
     LARGEST_TURN,
     NEAR_BASE,
     NEWTON_END,
     NEWTON_STEPS,
-    GapCurvatures,
+    helical_turn,
+    helix_square,
+    normal_turn,
     normal_turns,
-    put_curvatures,
     steps_over,
     steps_squared,
+    tilt_of,
+    turn_normal,
     turned,
     unmark_unsettled,
 )
-from gearmbs.contact.support.profiles import (
-    corner_curvatures,
-    corner_slopes,
-    involute_curvatures,
-    involute_slopes,
-    normal_turn,
-    tilt_of,
-)
+
+EDGE_STEPS = 6  # of Newton's method for the place of a tip edge in a section
+EDGE_END = 1e-9  # rad; a further step would turn the edge by about the square of it
 
 # Distance of two lines, each parallel to one wheel's axis: tip corners against arcs and planes of the mate.
 
@@ -48,117 +49,31 @@ def line_offset(side, vx, vy, zeta):
 
 
 @kernel
-def line_distance(side, vx, vy, tx, ty, cx, cy, zeta):
-    """Fill the offset in the section of a tip line from a root line, with derivatives by (a, p, q, tip, root angle).
-
-    Second derivatives by the angles are ``-v_t`` and ``-v_c`` where ``v = v_t - v_c``; they follow from ``t`` and
-    ``c`` turned by a right angle.
+def line_gap(side, strip, k, tip, v, t, c, sign, offset, want):
+    """Fill section ``k`` with ``sign (distance - offset)`` of a tip line and a root line, measured in space.
 
     Parameters
     ----------
-    side : record
-        Out: its ``lines``.
-    vx, vy : float
-        Difference of the two lines' places in their wheels' own planes.
-    tx, ty, cx, cy : float
-        Its derivatives by the tip wheel's and the root wheel's angle.
-    zeta : float
-        Place of the section along the mean axis.
+    side, strip : record
+    k : int
+        Section.
+    tip : int
+        1 where the tip line is wheel 1's, else 0.
+    v, t, c : tuple of float
+        Difference of the two lines' places in their wheels' own planes; its derivatives by the angle of the tip's wheel
+        and by that of the root's.
+    sign, offset : float
+    want : int
+        Nonzero to fill second derivatives.
     """
-    a, p, q = side.x[L.A], side.x[L.P], side.x[L.Q]
-    iw, iw3, iw5 = side.i_w, side.i_w3, side.i_w5
-    m, mw, mww = side.m, side.m_w, side.m_ww
-    d, d_x, d_xx = side.lines.d, side.lines.d_x, side.lines.d_xx
-    # d = (a, 0) + v + (p, q) s, s = (p v_x + q v_y) m - 2 zeta / w
-    kap = p * vx + q * vy
-    for axis in range(2):
-        u = p if axis == 0 else q
-        v = vx if axis == 0 else vy
-        d[axis] = (a if axis == 0 else 0.0) + v + u * (kap * m - 2.0 * zeta * iw)
-    for i in range(5):
-        # w = sqrt(1 - p^2 - q^2): w_p = -p / w, so that m_p = -m_w p / w and (1 / w)_p = p / w^3
-        mi = -mw * iw * (p if i == 1 else (q if i == 2 else 0.0))
-        wi = iw3 * (p if i == 1 else (q if i == 2 else 0.0))
-        vix = tx if i == 3 else (cx if i == 4 else 0.0)
-        viy = ty if i == 3 else (cy if i == 4 else 0.0)
-        ki = p * vix + q * viy + (vx if i == 1 else (vy if i == 2 else 0.0))
-        si = mi * kap + m * ki - 2.0 * zeta * wi
-        for axis in range(2):
-            u = p if axis == 0 else q
-            ei = 1.0 if i == axis + 1 else 0.0
-            first = (1.0 if i == 0 and axis == 0 else 0.0) + (vix if axis == 0 else viy)
-            d_x[i, axis] = first + u * si + ei * (kap * m - 2.0 * zeta * iw)
-        for j in range(5):
-            mj = -mw * iw * (p if j == 1 else (q if j == 2 else 0.0))
-            wj = iw3 * (p if j == 1 else (q if j == 2 else 0.0))
-            vjx = tx if j == 3 else (cx if j == 4 else 0.0)
-            vjy = ty if j == 3 else (cy if j == 4 else 0.0)
-            kj = p * vjx + q * vjy + (vx if j == 1 else (vy if j == 2 else 0.0))
-            sj = mj * kap + m * kj - 2.0 * zeta * wj
-            # second derivatives of m and 1 / w: both only by p and q
-            pij = (p if i == 1 else q) * (p if j == 1 else q) if 1 <= i <= 2 and 1 <= j <= 2 else 0.0
-            same = 1.0 if i == j and 1 <= i <= 2 else 0.0
-            mij = mww * pij * iw * iw - mw * (same * iw + pij * iw3)
-            wij = same * iw3 + 3.0 * pij * iw5
-            # a place on a circle turned by its angle: the second derivative is the first, turned by a right angle
-            vijx = -viy if i == j and i >= 3 else 0.0
-            vijy = vix if i == j and i >= 3 else 0.0
-            kij = p * vijx + q * vijy
-            if i == 1:
-                kij += vjx
-            elif i == 2:
-                kij += vjy
-            if j == 1:
-                kij += vix
-            elif j == 2:
-                kij += viy
-            sij = mij * kap + mi * kj + mj * ki + m * kij - 2.0 * zeta * wij
-            for axis in range(2):
-                u = p if axis == 0 else q
-                ei = 1.0 if i == axis + 1 else 0.0
-                ej = 1.0 if j == axis + 1 else 0.0
-                d_xx[i, j, axis] = u * sij + ei * sj + ej * si + (vijx if axis == 0 else vijy)
-
-
-@kernel
-def distance_gap(side, strip, k, tip, sign, offset, want):
-    """Fill section ``k`` with ``sign (distance - offset)`` of the two lines of `line_distance`, measured in space."""
-    p, q = side.x[L.P], side.x[L.Q]
-    d, d_x, d_xx = side.lines.d, side.lines.d_x, side.lines.d_xx
-    dx, dy = d[0], d[1]
-    # of an offset d in the section the part along the axes, p d_x + q d_y, is no distance of parallel lines
-    lean = p * dx + q * dy
-    dist = np.sqrt(dx * dx + dy * dy - lean * lean)
-    strip.gap[k] = sign * (dist - offset)
-    clear_slopes(strip, k)
-    for i in range(5):
-        xi = pose_place(i, tip)
-        dix, diy = d_x[i, 0], d_x[i, 1]
-        li = p * dix + q * diy + (dx if i == 1 else (dy if i == 2 else 0.0))
-        gi_ = (dx * dix + dy * diy - lean * li) / dist
-        strip.grad[xi, k] = sign * gi_
-        if want == 0:
-            continue
-        for j in range(5):
-            xj = pose_place(j, tip)
-            if xj < xi:
-                continue
-            djx, djy = d_x[j, 0], d_x[j, 1]
-            lj = p * djx + q * djy + (dx if j == 1 else (dy if j == 2 else 0.0))
-            gj = (dx * djx + dy * djy - lean * lj) / dist
-            dijx, dijy = d_xx[i, j, 0], d_xx[i, j, 1]
-            lij = p * dijx + q * dijy
-            if i == 1:
-                lij += djx
-            elif i == 2:
-                lij += djy
-            if j == 1:
-                lij += dix
-            elif j == 2:
-                lij += diy
-            # D^2 = d.d - l^2: D_ij = (d_i.d_j + d.d_ij - l_i l_j - l l_ij - D_i D_j) / D
-            value = dix * djx + diy * djy + dx * dijx + dy * dijy - li * lj - lean * lij - gi_ * gj
-            strip.hess[xi, xj, k] = sign * value / dist
+    a, p, q, i_w, m, m_w, m_ww = side.x[L.A], side.x[L.P], side.x[L.Q], side.i_w, side.m, side.m_w, side.m_ww
+    zeta, own = strip.zeta[k], 2.0 * tip - 1.0
+    (vx, vy), (tx, ty), (cx, cy) = v, t, c
+    strip.gap[k] = D.line_gap(
+        a, p, q, zeta, vx, vy, tx, ty, cx, cy, i_w, m, m_w, m_ww, sign, offset, own, strip.grad, k
+    )
+    if want != 0:
+        D.line_bend(a, p, q, zeta, vx, vy, tx, ty, cx, cy, i_w, m, m_w, m_ww, sign, offset, own, strip.hess, k)
 
 
 @kernel
@@ -168,16 +83,6 @@ def clear_slopes(strip, k):
         strip.grad[i, k] = 0.0
         for j in range(i, 6):
             strip.hess[i, j, k] = 0.0
-
-
-@kernel
-def pose_place(i, tip):
-    """Place in the pose numbers of derivative ``i``: a, p, q, angle of the tip wheel, angle of the root wheel."""
-    if i == 0:
-        return 0
-    if i < 3:
-        return i + 1
-    return 5 - tip if i == 3 else 4 + tip
 
 
 @kernel
@@ -204,8 +109,8 @@ def corner_on_plane(side, corner, strip, k, first, eta, at, away, want):
     # the axis of the cylinder that touches the plane at the radius ``at``
     x = at * cb + (PLANE - away) * sb
     y = at * sb - (PLANE - away) * cb
-    line_distance(side, -r * ce - x, -r * se - y, r * se, -r * ce, y, -x, strip.zeta[k])
-    distance_gap(side, strip, k, 1 if first else 0, 1.0, PLANE + corner.rounding[k], want)
+    v, t, c = (-r * ce - x, -r * se - y), (r * se, -r * ce), (y, -x)
+    line_gap(side, strip, k, 1 if first else 0, v, t, c, 1.0, PLANE + corner.rounding[k], want)
 
 
 # Gaps of tip corners on the mate's involute in the sections of a strip; loops as in `sections`.
@@ -250,42 +155,39 @@ def corner_starts(side, corner, strip, n, rb, normal):
 
 
 @kernel
-def corner_normals(side, corner, strip, n, s0, rb):
+def corner_normals(side, corner, strip, n, start, rb):
     """Turn the normals onto those where the corners at work bear on the mate's involute, by Newton's method.
 
-    ``s0`` is the mate's ``rb (phi + psi)``. Unmarks sections whose iteration does not settle.
+    ``start`` is the mate's ``phi + psi``. Unmarks sections whose iteration does not settle.
     """
-    tilt = tilt_of(side)
-    p, q, w, i_w, m = tilt.p, tilt.q, tilt.w, tilt.i_w, tilt.m
-    a = side.x[0]
+    tilt, gentle, a = tilt_of(side), side.gentle, side.x[L.A]
     for _ in range(NEWTON_STEPS):
         for j in range(n):
-            sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
-            se, ce, r = corner.sin[j], corner.cos[j], corner.radius[j]
-            A = p * sa + q * ca
-            B = p * ca - q * sa
-            i_k2 = 1.0 / (1.0 - B * B)
-            i_k = np.sqrt(i_k2)
-            s = s0 + rb * (strip.alpha[j] + normal_turn(A, B, tilt)) + corner.rounding[j]
-            sn = sa * ce + ca * se
-            cs = ca * ce - sa * se
-            # V: the corner's place along the tilt, in its wheel's own plane; see the table of support functions
-            V = A * sn + B * cs
-            # first and second derivative of g = a sin - 2 A zeta / w - h_corner - h_flank by alpha, whose zero is the
-            # normal
-            g1 = a * ca - A * B * s * i_w * i_k - rb * i_k - r * (cs + m * B * V) - 2.0 * B * zeta * i_w
-            g2 = s * (A * A * i_w - B * B * w * i_k2) * i_k - a * sa + r * (sn + m * A * V) + 2.0 * A * zeta * i_w
-            step = min(max(-g1 / g2, -LARGEST_TURN), LARGEST_TURN)
-            strip.alpha[j] += step
-            strip.sin[j], strip.cos[j] = turned(sa, ca, step)
-            strip.step[j] = step
+            sa, ca = strip.sin[j], strip.cos[j]
+            s = rb * (start + strip.alpha[j] + normal_turn(sa, ca, tilt, gentle))
+            g1, g2, _ = D.corner_normal(a, strip.zeta[j], sa, ca, s, rb, *corner_of(corner, j), 1.0, *tilt)
+            turn_normal(strip, j, min(max(-g1 / g2, -LARGEST_TURN), LARGEST_TURN))
         if steps_squared(strip, n) < NEWTON_END * NEWTON_END:
             return
     unmark_unsettled(strip, n)
 
 
+@inlined
+def corner_of(corner, j):
+    """Return the corner at work in a section: sine and cosine of its polar angle, radius, rounding."""
+    return corner.sin[j], corner.cos[j], corner.radius[j], corner.rounding[j]
+
+
+@inlined
+def put_rolls(corner, strip, j, kind, foot):
+    """Fill what bears in a section, and the lengths of roll of the corner and of its foot on the mate."""
+    strip.roll_1[j] = corner.roll[j] if kind == 1 else foot
+    strip.roll_2[j] = foot if kind == 1 else corner.roll[j]
+    strip.kind[j] = float(kind)
+
+
 @kernel
-def corner_sections(side, corner, strip, n, kind, f, want):
+def corner_sections(side, corner, strip, n, kind, start, want):
     """Fill gaps of tip corners on the mate's flank, with derivatives by the pose.
 
     Parameters
@@ -295,74 +197,141 @@ def corner_sections(side, corner, strip, n, kind, f, want):
         Sections.
     kind : int
         The wheel whose corner bears, 1 or 2.
-    f : float
+    start : float
         Angle of the mate's tooth from the line of centres, and its half angle at the base circle.
     want : int
         Nonzero to fill second derivatives.
     """
-    tilt = tilt_of(side)
-    p, q, i_w, i_w3 = tilt.p, tilt.q, tilt.i_w, tilt.i_w3
-    a = side.x[0]
-    first = kind == 1
-    rb = side.base_2 if first else side.base_1
+    tilt, a = tilt_of(side), side.x[L.A]
+    rb, own = (side.base_2, 1.0) if kind == 1 else (side.base_1, -1.0)
     normal_turns(side, strip, n)
     for j in range(n):
-        sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
-        A = p * sa + q * ca
-        B = p * ca - q * sa
-        kap = np.sqrt(1.0 - B * B)
-        s = rb * (f + strip.alpha[j] + strip.turn[j])
-        sn = sa * corner.cos[j] + ca * corner.sin[j]
-        cs = ca * corner.cos[j] - sa * corner.sin[j]
-        h = corner_slopes(A, B, kap, sn, cs, corner.radius[j], corner.rounding[j], tilt)
-        g = involute_slopes(A, B, kap, s, rb, tilt)
-        # by the envelope theorem the gradient is that at a fixed alpha
-        gA = -h.A - g.A - 2.0 * zeta * kap * kap * i_w3
-        gB = -h.B - g.B - 2.0 * zeta * A * B * i_w3
-        strip.roll_1[j] = corner.roll[j] if first else s
-        strip.roll_2[j] = s if first else corner.roll[j]
-        strip.kind[j] = float(kind)
-        strip.gap[j] = a * sa - 2.0 * A * i_w * zeta - (h.h + g.h)
-        strip.grad[0, j] = sa
-        strip.grad[1, j] = 0.0
-        # A = p sin + q cos, B = p cos - q sin
-        strip.grad[2, j] = gA * sa + gB * ca
-        strip.grad[3, j] = gA * ca - gB * sa
-        strip.grad[4, j] = -h.F if first else -g.F
-        strip.grad[5, j] = -g.F if first else -h.F
+        s = rb * (start + strip.alpha[j] + strip.turn[j])
+        se, ce, r, rt = corner_of(corner, j)
+        put_rolls(corner, strip, j, kind, s)
+        strip.gap[j] = D.corner_gap(
+            a, strip.zeta[j], strip.sin[j], strip.cos[j], s, rb, se, ce, r, rt, own, strip.grad, j, *tilt
+        )
     if want == 0:
         return
-    i_w5 = tilt.i_w5
     for j in range(n):
-        sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
-        A = p * sa + q * ca
-        B = p * ca - q * sa
-        kap = np.sqrt(1.0 - B * B)
-        sn = sa * corner.cos[j] + ca * corner.sin[j]
-        cs = ca * corner.cos[j] - sa * corner.sin[j]
-        c = corner_curvatures(A, B, kap, sn, cs, corner.radius[j], corner.rounding[j], tilt)
-        d = involute_curvatures(A, B, kap, strip.roll_2[j] if first else strip.roll_1[j], rb, tilt)
-        put_curvatures(
-            strip, j, sa, ca,
-            GapCurvatures(
-                # g by alpha twice, by alpha and A, B and the two spins, and then without alpha; alpha goes by g_xx -
-                # g_xalpha g_alphax / g_alphaalpha
-                2.0 * A * i_w * zeta - a * sa - (c.alpha_alpha + d.alpha_alpha),
-                -(c.alpha_A + d.alpha_A) - 2.0 * zeta * A * B * i_w3,
-                -(c.alpha_B + d.alpha_B) - 2.0 * zeta * (i_w + B * B * i_w3),
-                -c.alpha_F if first else -d.alpha_F,
-                -d.alpha_F if first else -c.alpha_F,
-                -(c.AA + d.AA) - 6.0 * zeta * kap * kap * A * i_w5,
-                -(c.AB + d.AB) - 2.0 * zeta * (3.0 * kap * kap * B * i_w5 - 2.0 * B * i_w3),
-                -(c.BB + d.BB) - 2.0 * zeta * A * (i_w3 + 3.0 * B * B * i_w5),
-                -c.AF if first else -d.AF,
-                -c.BF if first else -d.BF,
-                -d.AF if first else -c.AF,
-                -d.BF if first else -c.BF,
-                -c.FF if first else 0.0,
-                0.0 if first else -c.FF,
-            ),
-        )  # fmt: skip
+        s = rb * (start + strip.alpha[j] + strip.turn[j])
+        se, ce, r, rt = corner_of(corner, j)
+        D.corner_bend(
+            a, strip.zeta[j], strip.sin[j], strip.cos[j], s, rb, se, ce, r, rt, own, strip.alpha_x, strip.hess, j, *tilt
+        )
+
+
+# Tip edges of helical wheels.
+
+
+@kernel
+def set_edges(side, corner, strip, n, first):
+    """Turn tip corners at a wheel's middle, in ``corner``, to where their helical edges pass the sections of a strip.
+
+    Parameters
+    ----------
+    side : record
+    corner : record
+        In: sine and cosine of the polar angle at the wheel's middle; out: in the sections.
+    strip : record
+        Its sections are placed; ``strip.step`` and ``strip.turn`` are used on the way.
+    n : int
+        Sections.
+    first : bool
+        Whether the edges are wheel 1's.
+    """
+    p, q, w, i_w = side.x[L.P], side.x[L.Q], side.w, side.i_w
+    half = (0.5 if first else -0.5) * side.x[L.H]
+    k = side.twist_1 / side.base_1 if first else side.twist_2 / side.base_2
+    turn_edges(corner, strip, n, -k * i_w, half)
+    for j in range(n):
+        strip.good[j] = 1.0
+    for _ in range(EDGE_STEPS):
+        for j in range(n):
+            se, ce, r = corner.sin[j], corner.cos[j], corner.radius[j]
+            behind = w * strip.turn[j] + k * (strip.zeta[j] + half + r * (p * ce + q * se))
+            step = -behind / (w + k * r * (q * ce - p * se))
+            strip.turn[j] += step
+            corner.sin[j], corner.cos[j] = turned(se, ce, step)
+            strip.step[j] = step
+        if steps_squared(strip, n) < EDGE_END * EDGE_END:
+            return
+
+
+@kernel
+def turn_edges(corner, strip, n, per, half):
+    """Turn the corners by ``per`` times the place of their section from the wheel's middle; fills ``strip.turn``."""
+    start = strip.zeta[0]
+    turn = per * (start + half)
+    sin, cos = np.sin(turn), np.cos(turn)
+    for j in range(n):
+        strip.turn[j] = per * (strip.zeta[j] + half)
+        strip.step[j] = per * (strip.zeta[j] - start)
+    if steps_over(strip, n, LARGEST_TURN) > 0.0:
+        for j in range(n):
+            st, ct, se, ce = np.sin(strip.turn[j]), np.cos(strip.turn[j]), corner.sin[j], corner.cos[j]
+            corner.sin[j], corner.cos[j] = se * ct + ce * st, ce * ct - se * st
+        return
+    for j in range(n):
+        se, ce = corner.sin[j], corner.cos[j]
+        corner.sin[j], corner.cos[j] = turned(se * cos + ce * sin, ce * cos - se * sin, strip.step[j])
+
+
+@kernel
+def edge_normals(side, corner, strip, n, kind, start, rb):
+    """Turn the normals onto those where the tip edges at work bear on the mate's helicoid; as `corner_normals`.
+
+    They start from those of parallel axes.
+    """
+    if side.pitch_mismatch_bound == 0.0:
+        return
+    tilt, a, h, c = tilt_of(side), side.x[L.A], side.x[L.H], helix_square(side)
+    t, k, own = edge_numbers(side, kind)
+    for _ in range(NEWTON_STEPS):
+        for j in range(n):
+            sa, ca = strip.sin[j], strip.cos[j]
+            s = rb * (start + strip.alpha[j] + helical_turn(sa, ca, t, tilt))
+            g1, g2, _ = D.edge_normal(
+                a, strip.zeta[j], h, sa, ca, t, c, s, rb, *corner_of(corner, j), k, own, *tilt
+            )  # fmt: skip
+            turn_normal(strip, j, min(max(-g1 / g2, -LARGEST_TURN), LARGEST_TURN))
+        if steps_squared(strip, n) < NEWTON_END * NEWTON_END:
+            return
+    unmark_unsettled(strip, n)
+
+
+@inlined
+def edge_numbers(side, kind):
+    """Return the helix of the mate, by how much the edge turns per length of its wheel, and 1 or -1 for the wheel."""
+    if kind == 1:
+        return side.twist_2, side.twist_1 / side.base_1, 1.0
+    return side.twist_1, side.twist_2 / side.base_2, -1.0
+
+
+@kernel
+def edge_sections(side, corner, strip, n, kind, start, want):
+    """Fill gaps of helical tip edges on the mate's flank, with derivatives by the pose; as `corner_sections`."""
+    tilt, a, h, c = tilt_of(side), side.x[L.A], side.x[L.H], helix_square(side)
+    rb = side.base_2 if kind == 1 else side.base_1
+    t, k, own = edge_numbers(side, kind)
+    for j in range(n):
+        sa, ca = strip.sin[j], strip.cos[j]
+        s = rb * (start + strip.alpha[j] + helical_turn(sa, ca, t, tilt))
+        se, ce, r, rt = corner_of(corner, j)
+        strip.gap[j], foot = D.edge_gap(
+            a, strip.zeta[j], h, sa, ca, t, c, s, rb, se, ce, r, rt, k, own, strip.grad, j, *tilt
+        )
+        put_rolls(corner, strip, j, kind, foot)
+    if want == 0:
+        return
+    for j in range(n):
+        sa, ca = strip.sin[j], strip.cos[j]
+        s = rb * (start + strip.alpha[j] + helical_turn(sa, ca, t, tilt))
+        se, ce, r, rt = corner_of(corner, j)
+        D.edge_bend(
+            a, strip.zeta[j], h, sa, ca, t, c, s, rb, se, ce, r, rt, k, own, strip.alpha_x, strip.hess, j, *tilt
+        )
 
 
 @kernel
@@ -428,10 +397,10 @@ def corner_gaps(side, wheels, corner, strip, n, kind, f_mate, normal, lookup, wa
         return
     corner_starts(side, corner, strip, n, rb, normal)
     if side.twist_1 != 0.0:
-        edge_normals(side, corner, strip, n, kind == 1, rb * start, rb)
+        edge_normals(side, corner, strip, n, kind, start, rb)
         edge_sections(side, corner, strip, n, kind, start, want)
     else:
-        corner_normals(side, corner, strip, n, rb * start, rb)
+        corner_normals(side, corner, strip, n, start, rb)
         corner_sections(side, corner, strip, n, kind, start, want)
     mended = False
     for j in range(n):

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.formulas import derived as D
 from gearmbs.contact.records import integers_of, kernel, reals_of
-from gearmbs.contact.support.profiles import edge_bends, edge_of, tilt_of
 
 SHORTEST = 0.01  # length of roll over base radius where the lookup ends towards the base circle
 
@@ -61,37 +61,13 @@ def roll_of_flanks(side, wheels, lookup, wheel, f1, f2, zeta):
         Place of the section along the mean axis.
     """
     clear_lookup(lookup)
-    a, p, q = side.x[L.A], side.x[L.P], side.x[L.Q]
-    rb1, rb2, Rb = side.base_1, side.base_2, side.base_sum
-    l, alpha = side.length, side.alpha_0
-    sign = 1.0 if wheel == 0 else -1.0
-    own = rb1 if wheel == 0 else rb2
-    half_1, half_2 = wheels.wheel_1.half_angle, wheels.wheel_2.half_angle
-    # half-way between the flanks: s_1 = (r_b1 F_1 - r_b2 F_2 + (r_b1 - r_b2) alpha + L) / 2 on wheel 1, on wheel 2 with
-    # the other sign but for L
-    diff = 0.5 * sign * (rb1 * (f1 + half_1) - rb2 * (f2 + half_2) + side.base_difference * alpha)
-    # cos alpha = R_b / a and L = sqrt(a^2 - R_b^2): alpha_a = R_b / (a L), L_a = a / L
-    k1 = Rb / (a * l)
-    turn = 2.0 * zeta * own
-    twist = side.twist_1 if wheel == 0 else side.twist_2
-    half = 0.5 * sign * side.x[L.H]
-    # a tilt turns the normal of a section by 2 zeta (q / a - p R_b / (a L)), a helix the tooth by the place along the
-    # axis
-    lookup.roll = diff + 0.5 * l + turn * (q / a - p * k1) - twist * (zeta + half)
-    # derivatives of alpha_a by a
-    k1_a = -Rb * (1.0 / (a * a * l) + 1.0 / l**3)
-    slope = 0.5 * sign * side.base_difference
-    grad, hess = lookup.grad, lookup.hess
-    grad[L.A] = slope * k1 + 0.5 * a / l + turn * (-q / (a * a) - p * k1_a)
-    grad[L.H] = -0.5 * sign * twist
-    grad[L.P] = -turn * k1
-    grad[L.Q] = turn / a
-    grad[L.F1] = 0.5 * sign * rb1
-    grad[L.F2] = -0.5 * sign * rb2
-    k1_aa = Rb * (2.0 / (a**3 * l) + 1.0 / (a * l**3) + 3.0 * a / l**5)
-    hess[L.A, L.A] = slope * k1_a - 0.5 * Rb * Rb / l**3 + turn * (2.0 * q / a**3 - p * k1_aa)
-    hess[L.A, L.P] = hess[L.P, L.A] = -turn * k1_a
-    hess[L.A, L.Q] = hess[L.Q, L.A] = -turn / (a * a)
+    x, wheel_1 = side.x, wheel == 0
+    own, twist, sign = (side.base_1, side.twist_1, 1.0) if wheel_1 else (side.base_2, side.twist_2, -1.0)
+    F1, F2 = f1 + wheels.wheel_1.half_angle, f2 + wheels.wheel_2.half_angle
+    lookup.roll = D.flanks_roll(
+        x[L.A], x[L.H], x[L.P], x[L.Q], F1, F2, zeta, own, twist, sign, side.base_1, side.base_2, side.alpha_0,
+        side.length, lookup.grad, lookup.hess,
+    )  # fmt: skip
 
 
 @kernel
@@ -117,77 +93,18 @@ def roll_under_corner(side, corner, strip, j, lookup, wheel, want):
     a, zeta = side.x[L.A], strip.zeta[j]
     mate = side.base_1 if wheel == 0 else side.base_2
     r, se, ce = corner.radius[j], corner.sin[j], corner.cos[j]
-    # from the mate's axis, moved by the tilt to first order
-    Px = a - r * ce - 2.0 * side.x[L.P] * zeta
-    Py = -r * se - 2.0 * side.x[L.Q] * zeta
-    s2 = Px * Px + Py * Py - mate * mate
+    x, own = side.x, 1.0 if wheel == 1 else -1.0
+    twist, base = (side.twist_1, side.base_1) if wheel == 1 else (side.twist_2, side.base_2)
+    s2 = D.foot_square(a, x[L.P], x[L.Q], zeta, r, se, ce, mate)
     if s2 < SHORTEST * SHORTEST * mate * mate:
         lookup.roll += SHORTEST * mate - corner.rounding[j]
         return
-    # the mate's length of roll there: s^2 = P^2 - r_b^2
     s = np.copysign(np.sqrt(s2), mate)
     lookup.roll += s - corner.rounding[j]
-    i_s = 1.0 / s
-    first = wheel == 1
-    tilt = tilt_of(side)
-    k_edge = side.twist_1 / side.base_1 if first else side.twist_2 / side.base_2
-    sign = 0.5 if first else -0.5
-    edge = edge_of(ce, se, r, k_edge, zeta + sign * side.x[L.H], tilt)
-    # a helical edge moves around its wheel with the axial offset and the tilt
-    turn = (0.0, sign * edge.Z, edge.p, edge.q, edge.F if first else 0.0, 0.0 if first else edge.F)
-    for i in range(6):
-        dx = 1.0 if i == L.A else r * se * turn[i]
-        dy = -r * ce * turn[i]
-        dx -= 2.0 * zeta if i == L.P else 0.0
-        dy -= 2.0 * zeta if i == L.Q else 0.0
-        # s_i = P . P_i / s
-        by_i = (Px * dx + Py * dy) * i_s
-        grad[i] += by_i
-        if want == 0:
-            continue
-        for k in range(6):
-            ex = 1.0 if k == L.A else r * se * turn[k]
-            ey = -r * ce * turn[k]
-            ex -= 2.0 * zeta if k == L.P else 0.0
-            ey -= 2.0 * zeta if k == L.Q else 0.0
-            # s_ik = (P_i . P_k + P . P_ik - s_i s_k) / s, P_ik of a place on a circle turned by its angle
-            value = dx * ex + dy * ey - by_i * (Px * ex + Py * ey) * i_s
-            value += turn[i] * turn[k] * r * (Px * ce + Py * se)
-            hess[i, k] += value * i_s
-    if want != 0 and k_edge != 0.0:
-        bends = edge_bends(edge, ce, se, r, k_edge, tilt)
-        add_bends(hess, bends, (Px * se - Py * ce) * r * i_s, sign, L.F1 if first else L.F2)
-
-
-@kernel
-def add_bends(hess, bends, share, sign, f):
-    """Add second derivatives of a tip edge's polar angle to a Hessian.
-
-    Parameters
-    ----------
-    hess : ndarray, shape (6, 6)
-    bends : EdgeBends
-    share : float
-        Derivative of the place by the polar angle.
-    sign : float
-        +0.5 for wheel 1, -0.5 for wheel 2: of its place along the axis by the axial offset.
-    f : int
-        Its spin.
-    """
-    hess[L.P, L.P] += share * bends.pp
-    hess[L.Q, L.Q] += share * bends.qq
-    hess[f, f] += share * bends.FF
-    hess[L.H, L.H] += share * sign * sign * bends.ZZ
-    for i, k, value in (
-        (L.P, L.Q, bends.pq),
-        (L.P, f, bends.pF),
-        (L.Q, f, bends.qF),
-        (L.P, L.H, sign * bends.pZ),
-        (L.Q, L.H, sign * bends.qZ),
-        (f, L.H, sign * bends.FZ),
-    ):
-        hess[i, k] += share * value
-        hess[k, i] += share * value
+    numbers = (a, x[L.H], x[L.P], x[L.Q], zeta, r, se, ce, own, s, twist / base, side.w)
+    D.foot_slopes(*numbers, grad)
+    if want != 0:
+        D.foot_bends(*numbers, hess)
 
 
 @kernel

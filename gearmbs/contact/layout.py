@@ -186,8 +186,6 @@ MOTION = record(
     ("by_xd", 6, PADDED),  # and by the pose's rates
     ("jac", 6, PADDED),  # derivative of the wrench by displacements of wheel 1
 )
-LINES = record(("d", 2), ("d_x", 5, 2), ("d_xx", 5, 5, 2))
-"""Offset of a tip line from a root line, with derivatives by (a, p, q, tip angle, root angle)."""
 SIDE = record(
     ("x", 6),  # pose, rates and twist as seen on the side of the teeth at work
     ("xd", 6),
@@ -226,7 +224,6 @@ SIDE = record(
     "overhang",  # how far the common face may reach beyond the slices, m
     "curve",  # lower bound of the corner gap's growth beyond the path of contact, 1/m; 0: none
     "sign",  # +1 or -1, for the tables that name flanks
-    ("lines", LINES),
 )
 TOOTH_PAIR = record(
     "f_1",  # angles of the two teeth from the line of centres
@@ -299,9 +296,6 @@ LOADS = lanes(
     "tangent",
     ("normal_x", 6),
     ("tangent_x", 6),
-    "slope_A",  # slopes of the support function of wheel 1's profile
-    "slope_B",
-    "slope_F",
     ("profile", 6),  # unit wrenches of a force along the profile and along the face
     ("axial", 6),
     "v_profile",  # sliding velocity

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.corners import copy_corner, corner_gaps, set_corner
+from gearmbs.contact.corners import copy_corner, corner_gaps, set_corner, set_edges
 from gearmbs.contact.deviations import add_deviations, pair_stiffness_factor, tip_roll, tooth_flank
-from gearmbs.contact.helical_sections import helical_flanks, helical_normals, set_edges
 from gearmbs.contact.loads import (
     add_friction,
     add_normal,
@@ -31,7 +30,12 @@ from gearmbs.contact.search import (
     strips_between,
     teeth_in_reach,
 )
-from gearmbs.contact.sections import gap_rates, set_sections
+from gearmbs.contact.sections import (
+    gap_rates,
+    helical_flanks,
+    helical_normals,
+    set_sections,
+)
 from gearmbs.contact.slices import centroid_force, law_of, plane_force
 
 # What bears in the sections of one tooth pair: flanks, or the corner of either tooth; and its deviations.

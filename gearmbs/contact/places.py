@@ -10,22 +10,9 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.formulas import derived as D
+from gearmbs.contact.gaps import derived as S
 from gearmbs.contact.records import inlined, kernel
-from gearmbs.contact.sections import LARGEST_TURN, NEAR_BASE
-from gearmbs.contact.support.profiles import (
-    corner_curvatures,
-    corner_slopes,
-    edge_curvatures,
-    edge_of,
-    edge_slopes,
-    helical_turn,
-    helicoid_curvatures,
-    helicoid_slopes,
-    involute_curvatures,
-    involute_slopes,
-    screw_of,
-    tilt_of,
-)
+from gearmbs.contact.sections import LARGEST_TURN, NEAR_BASE, helical_turn, helix_square, tilt_of
 
 
 @kernel
@@ -294,77 +281,29 @@ def contact_points(side, corner, strip, loads, n, f, corners, want):
     if level(side, strip, n, want):
         level_point(side, corner, strip, loads, f)
         return
-    tilt = tilt_of(side)
-    p, q, i_w = tilt.p, tilt.q, tilt.i_w
-    rb, half_h = side.base_1, 0.5 * side.x[1]
+    tilt, rb, h = tilt_of(side), side.base_1, side.x[L.H]
     for j in range(n):
-        sa, ca = strip.sin[j], strip.cos[j]
-        A = p * sa + q * ca
-        B = p * ca - q * sa
-        kap = np.sqrt(1.0 - B * B)
-        zp = strip.zeta[j] + half_h
-        # length of roll, and the support function h of the involute with its slopes
+        gap, zeta, sa, ca = strip.gap[j], strip.zeta[j], strip.sin[j], strip.cos[j]
         s = rb * (f + strip.alpha[j] + strip.turn[j])
-        h = involute_slopes(A, B, kap, s, rb, tilt)
-        c = h
+        normal, tangent = S.involute_point(gap, zeta, h, sa, ca, s, rb, *tilt)
         if corners:
-            sn = sa * corner.cos[j] + ca * corner.sin[j]
-            cs = ca * corner.cos[j] - sa * corner.sin[j]
-            c = corner_slopes(A, B, kap, sn, cs, corner.radius[j], corner.rounding[j], tilt)
-        bears = strip.kind[j] == 1.0
-        # half-way between the surfaces: the support function of wheel 1, or of its corner, and half the gap; where the
-        # section stands along the tilted axis moves both
-        loads.normal[j] = (c.h if bears else h.h) + A * i_w * zp + 0.5 * strip.gap[j]
-        loads.tangent[j] = (c.alpha if bears else h.alpha) + B * i_w * zp
-        loads.slope_A[j] = c.A if bears else h.A
-        loads.slope_B[j] = c.B if bears else h.B
-        loads.slope_F[j] = c.F if bears else h.F
-    if want != 0:
-        point_slopes(side, corner, strip, loads, n, f, corners)
-
-
-@kernel
-def point_slopes(side, corner, strip, loads, n, f, corners):
-    """Fill derivatives of the contact points by the pose; arguments as in `contact_points`, which runs before."""
-    tilt = tilt_of(side)
-    p, q, i_w, i_w3 = tilt.p, tilt.q, tilt.i_w, tilt.i_w3
-    rb, half_h = side.base_1, 0.5 * side.x[1]
+            se, ce, r, rt = corner.sin[j], corner.cos[j], corner.radius[j], corner.rounding[j]
+            bears = strip.kind[j] == 1.0
+            corner_normal, corner_tangent = S.corner_point(gap, zeta, h, sa, ca, se, ce, r, rt, *tilt)
+            normal, tangent = corner_normal if bears else normal, corner_tangent if bears else tangent
+        loads.normal[j], loads.tangent[j] = normal, tangent
+    if want == 0:
+        return
+    turns, grad, normal_x, tangent_x = strip.alpha_x, strip.grad, loads.normal_x, loads.tangent_x
     for j in range(n):
-        sa, ca = strip.sin[j], strip.cos[j]
-        A = p * sa + q * ca
-        B = p * ca - q * sa
-        kap = np.sqrt(1.0 - B * B)
-        zp = strip.zeta[j] + half_h
+        zeta, sa, ca = strip.zeta[j], strip.sin[j], strip.cos[j]
         s = rb * (f + strip.alpha[j] + strip.turn[j])
-        h = involute_curvatures(A, B, kap, s, rb, tilt)
-        c = h
-        if corners:
-            sn = sa * corner.cos[j] + ca * corner.sin[j]
-            cs = ca * corner.cos[j] - sa * corner.sin[j]
-            c = corner_curvatures(A, B, kap, sn, cs, corner.radius[j], corner.rounding[j], tilt)
-        bears = strip.kind[j] == 1.0
-        cross = A * B * i_w3 * zp
-        normal_A = loads.slope_A[j] + kap * kap * i_w3 * zp
-        normal_B = loads.slope_B[j] + cross
-        tangent_A = (c.alpha_A if bears else h.alpha_A) + cross
-        tangent_B = (c.alpha_B if bears else h.alpha_B) + (i_w + B * B * i_w3) * zp
-        # derivatives by alpha, which moves with the pose by alpha_x
-        by_n = loads.tangent[j]
-        by_t = (c.alpha_alpha if bears else h.alpha_alpha) - A * i_w * zp
-        x = strip.alpha_x
-        grad, normal, tangent = strip.grad, loads.normal_x, loads.tangent_x
-        normal[0, j] = 0.5 * grad[0, j] + by_n * x[0, j]
-        normal[1, j] = 0.5 * grad[1, j] + by_n * x[1, j] + 0.5 * A * i_w
-        normal[2, j] = 0.5 * grad[2, j] + by_n * x[2, j] + normal_A * sa + normal_B * ca
-        normal[3, j] = 0.5 * grad[3, j] + by_n * x[3, j] + normal_A * ca - normal_B * sa
-        normal[4, j] = 0.5 * grad[4, j] + by_n * x[4, j] + loads.slope_F[j]
-        normal[5, j] = 0.5 * grad[5, j] + by_n * x[5, j]
-        tangent[0, j] = by_t * x[0, j]
-        tangent[1, j] = by_t * x[1, j] + 0.5 * B * i_w
-        tangent[2, j] = by_t * x[2, j] + tangent_A * sa + tangent_B * ca
-        tangent[3, j] = by_t * x[3, j] + tangent_A * ca - tangent_B * sa
-        tangent[4, j] = by_t * x[4, j] + (c.alpha_F if bears else h.alpha_F)
-        tangent[5, j] = by_t * x[5, j]
+        S.involute_point_slopes(zeta, h, sa, ca, s, rb, turns, grad, normal_x, tangent_x, j, *tilt)
+    for j in range(n if corners else 0):
+        if strip.kind[j] == 1.0:
+            zeta, sa, ca = strip.zeta[j], strip.sin[j], strip.cos[j]
+            se, ce, r, rt = corner.sin[j], corner.cos[j], corner.radius[j], corner.rounding[j]
+            S.corner_point_slopes(zeta, h, sa, ca, se, ce, r, rt, turns, grad, normal_x, tangent_x, j, *tilt)
 
 
 # Where the contacts of helical wheels stand, and friction in their tangent plane; loops as in `sections`.
@@ -372,7 +311,7 @@ def point_slopes(side, corner, strip, loads, n, f, corners):
 
 @kernel
 def helical_points(side, corner, strip, loads, n, f, corners, want):
-    """Fill where the contacts of helical wheels stand, and their derivatives; as `points.contact_points`.
+    """Fill where the contacts of helical wheels stand, and their derivatives; as `contact_points`.
 
     Parameters
     ----------
@@ -386,79 +325,30 @@ def helical_points(side, corner, strip, loads, n, f, corners, want):
     want : int
         Nonzero to fill derivatives.
     """
-    flank_points(side, strip, loads, n, f, want)
-    if corners:
-        edge_points(side, corner, strip, loads, n, want)
-
-
-@kernel
-def flank_points(side, strip, loads, n, f, want):
-    """Fill the points of sections in which wheel 1's flank bears; arguments as in `helical_points`."""
-    tilt = tilt_of(side)
-    half, rb, t = 0.5 * side.x[L.H], side.base_1, side.twist_1
+    tilt, rb, h, t, c = tilt_of(side), side.base_1, side.x[L.H], side.twist_1, helix_square(side)
+    k, bears = t / rb, strip.kind
     for j in range(n):
-        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
-        screw = screw_of(sa, ca, t, tilt)
-        s = rb * (f + strip.alpha[j] + helical_turn(screw.A, screw.B, screw.kap2, t, tilt))
-        slopes = helicoid_slopes(screw, s, Z, rb, t, sa, ca, tilt)
-        loads.normal[j] = slopes.h + 0.5 * strip.gap[j]
-        loads.tangent[j] = slopes.alpha
+        zeta, sa, ca = strip.zeta[j], strip.sin[j], strip.cos[j]
+        s = rb * (f + strip.alpha[j] + helical_turn(sa, ca, t, tilt))
+        loads.normal[j], loads.tangent[j] = S.helicoid_point(strip.gap[j], zeta, h, sa, ca, t, c, s, rb, *tilt)
+    for j in range(n if corners else 0):
+        zeta, sa, ca = strip.zeta[j], strip.sin[j], strip.cos[j]
+        se, ce, r, rt = corner.sin[j], corner.cos[j], corner.radius[j], corner.rounding[j]
+        normal, tangent = S.edge_point(strip.gap[j], zeta, h, sa, ca, se, ce, r, rt, k, *tilt)
+        loads.normal[j] = normal if bears[j] == 1.0 else loads.normal[j]
+        loads.tangent[j] = tangent if bears[j] == 1.0 else loads.tangent[j]
     if want == 0:
         return
+    turns, grad, normal_x, tangent_x = strip.alpha_x, strip.grad, loads.normal_x, loads.tangent_x
     for j in range(n):
-        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
-        screw = screw_of(sa, ca, t, tilt)
-        s = rb * (f + strip.alpha[j] + helical_turn(screw.A, screw.B, screw.kap2, t, tilt))
-        slopes = helicoid_slopes(screw, s, Z, rb, t, sa, ca, tilt)
-        put_point_slopes(strip, loads, j, slopes, helicoid_curvatures(screw, s, Z, rb, t, sa, ca, tilt))
-
-
-@kernel
-def edge_points(side, corner, strip, loads, n, want):
-    """Fill the points of sections in which wheel 1's edge bears; arguments as in `helical_points`."""
-    tilt = tilt_of(side)
-    half, t = 0.5 * side.x[L.H], side.twist_1
-    k = t / side.base_1
-    for j in range(n):
-        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
-        ce, se, r, rt = corner.cos[j], corner.sin[j], corner.radius[j], corner.rounding[j]
-        screw = screw_of(sa, ca, t, tilt)
-        sn, cs = sa * ce + ca * se, ca * ce - sa * se
-        slopes = edge_slopes(screw, edge_of(ce, se, r, k, Z, tilt), sn, cs, r, rt, Z, sa, ca, tilt)
-        bears = strip.kind[j] == 1.0
-        loads.normal[j] = slopes.h + 0.5 * strip.gap[j] if bears else loads.normal[j]
-        loads.tangent[j] = slopes.alpha if bears else loads.tangent[j]
-    if want == 0:
-        return
-    for j in range(n):
-        if strip.kind[j] != 1.0:
-            continue
-        sa, ca, Z = strip.sin[j], strip.cos[j], strip.zeta[j] + half
-        ce, se, r, rt = corner.cos[j], corner.sin[j], corner.radius[j], corner.rounding[j]
-        screw = screw_of(sa, ca, t, tilt)
-        sn, cs = sa * ce + ca * se, ca * ce - sa * se
-        edge = edge_of(ce, se, r, k, Z, tilt)
-        slopes = edge_slopes(screw, edge, sn, cs, r, rt, Z, sa, ca, tilt)
-        curvatures = edge_curvatures(screw, edge, sn, cs, ce, se, r, rt, k, Z, sa, ca, tilt)
-        put_point_slopes(strip, loads, j, slopes, curvatures)
-
-
-@inlined
-def put_point_slopes(strip, loads, j, s, c):
-    """Fill the derivatives of a contact point from slopes and curvatures of wheel 1's support."""
-    x, grad, normal, tangent = strip.alpha_x, strip.grad, loads.normal_x, loads.tangent_x
-    normal[0, j] = 0.5 * grad[0, j] + s.alpha * x[0, j]
-    normal[1, j] = 0.5 * grad[1, j] + s.alpha * x[1, j] + 0.5 * s.Z
-    normal[2, j] = 0.5 * grad[2, j] + s.alpha * x[2, j] + s.p
-    normal[3, j] = 0.5 * grad[3, j] + s.alpha * x[3, j] + s.q
-    normal[4, j] = 0.5 * grad[4, j] + s.alpha * x[4, j] + s.F
-    normal[5, j] = 0.5 * grad[5, j] + s.alpha * x[5, j]
-    tangent[0, j] = c.alpha_alpha * x[0, j]
-    tangent[1, j] = c.alpha_alpha * x[1, j] + 0.5 * c.alpha_Z
-    tangent[2, j] = c.alpha_alpha * x[2, j] + c.alpha_p
-    tangent[3, j] = c.alpha_alpha * x[3, j] + c.alpha_q
-    tangent[4, j] = c.alpha_alpha * x[4, j] + c.alpha_F
-    tangent[5, j] = c.alpha_alpha * x[5, j]
+        zeta, sa, ca = strip.zeta[j], strip.sin[j], strip.cos[j]
+        s = rb * (f + strip.alpha[j] + helical_turn(sa, ca, t, tilt))
+        S.helicoid_point_slopes(zeta, h, sa, ca, t, c, s, rb, turns, grad, normal_x, tangent_x, j, *tilt)
+    for j in range(n if corners else 0):
+        if bears[j] == 1.0:
+            zeta, sa, ca = strip.zeta[j], strip.sin[j], strip.cos[j]
+            se, ce, r, rt = corner.sin[j], corner.cos[j], corner.radius[j], corner.rounding[j]
+            S.edge_point_slopes(zeta, h, sa, ca, se, ce, r, rt, k, turns, grad, normal_x, tangent_x, j, *tilt)
 
 
 @kernel

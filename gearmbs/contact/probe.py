@@ -7,13 +7,17 @@ from numba import float64, int64
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import add_deviations, pair_stiffness_factor, roll_under_corner
-from gearmbs.contact.helical_sections import helical_flanks, helical_normals
 from gearmbs.contact.pair import pair_corners, pair_kinds, set_pair
 from gearmbs.contact.places import contact_points, end_roll, helical_points, limit_value, roll_difference
 from gearmbs.contact.pose import relative_pose
 from gearmbs.contact.records import CONTRACT, kernel, options_at, pair_at, scratch_at
 from gearmbs.contact.search import face_pair, facing_teeth, open_side, set_twist, teeth_in_reach
-from gearmbs.contact.sections import flank_normals, flank_sections
+from gearmbs.contact.sections import (
+    flank_normals,
+    flank_sections,
+    helical_flanks,
+    helical_normals,
+)
 from gearmbs.kernels.jit import njit
 
 _VEC, _MATRIX = float64[::1], float64[:, ::1]

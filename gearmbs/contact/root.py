@@ -24,8 +24,7 @@ from gearmbs.contact.corners import (
     clear_slopes,
     copy_corner,
     corner_on_plane,
-    distance_gap,
-    line_distance,
+    line_gap,
     line_offset,
     set_corner,
 )
@@ -91,8 +90,9 @@ def root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want):
         off = f_tip - np.arctan2(inside * dy, inside * dx)
         psi = abs(own.corner_angle)
         if abs(off) <= psi:
-            line_distance(side, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, zeta)
-            distance_gap(side, strip, j, tip, inside, inside * (own.tip_radius + mate.root_radius), want)
+            still = (0.0, 0.0)
+            offset = inside * (own.tip_radius + mate.root_radius)
+            line_gap(side, strip, j, tip, still, still, still, inside, offset, want)
             return
         nearer = f_tip - psi if off > 0.0 else f_tip + psi
         se, ce = np.sin(nearer), np.cos(nearer)
@@ -102,8 +102,8 @@ def root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want):
         eta = f_root + mate.fillet_angle
         # hollow: the gap grows as the distance from the arc's centre falls
         rs, rc = mate.fillet_centre_radius * np.sin(eta), mate.fillet_centre_radius * np.cos(eta)
-        line_distance(side, -r * ce - rc, -r * se - rs, r * se, -r * ce, rs, -rc, zeta)
-        distance_gap(side, strip, j, tip, -1.0, mate.fillet_radius - corner.rounding[0], want)
+        v, t, c = (-r * ce - rc, -r * se - rs), (r * se, -r * ce), (rs, -rc)
+        line_gap(side, strip, j, tip, v, t, c, -1.0, mate.fillet_radius - corner.rounding[0], want)
     elif part == ON_FLANK:
         rf, rc = mate.fillet_radius, mate.fillet_centre_radius
         end = f_root + mate.fillet_angle - np.arcsin(rf / rc)
@@ -111,8 +111,8 @@ def root_gap(side, own, mate, corner, part, tip, f_tip, f_root, strip, j, want):
         corner_on_plane(side, corner, strip, j, tip == 1, end, at, 0.0, want)
     else:
         hollow = np.copysign(1.0, mate.root_radius)
-        line_distance(side, -r * ce, -r * se, r * se, -r * ce, 0.0, 0.0, zeta)
-        distance_gap(side, strip, j, tip, hollow, hollow * (mate.root_radius + corner.rounding[0]), want)
+        v, t, offset = (-r * ce, -r * se), (r * se, -r * ce), hollow * (mate.root_radius + corner.rounding[0])
+        line_gap(side, strip, j, tip, v, t, (0.0, 0.0), hollow, offset, want)
 
 
 @kernel

@@ -5,11 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
-from gearmbs.contact.helical_sections import helical_flanks, helical_normals
 from gearmbs.contact.places import level, level_flanks
 from gearmbs.contact.records import kernel, strip_at
-from gearmbs.contact.sections import flank_normals, flank_sections, gap_rates, set_sections
-from gearmbs.contact.support.profiles import GENTLE
+from gearmbs.contact.sections import (
+    GENTLE,
+    flank_normals,
+    flank_sections,
+    gap_rates,
+    helical_flanks,
+    helical_normals,
+    set_sections,
+)
 
 # a parabola falls less from one step to the next the nearer it is to its foot, so that 1 would do where the contact
 # moves evenly along the profile; it need not

@@ -1,19 +1,20 @@
-"""The gap of two involutes in the sections of a strip: solve for the normal, then value, gradient and Hessian.
+"""The gap of two flanks in the sections of a strip: solve for the normal, then value, gradient and Hessian.
 
-Each function runs over the sections of a strip side by side. Its loops have no calls and no branches that depend on
-the section, so that the compiler turns them into vector instructions: what differs between sections is chosen, not
-jumped over. Numbers that all sections share are copied out of their records before a loop.
+What a gap is stands in `gearmbs.contact.gaps.definitions`. Each function here runs over the sections of a strip side
+by side. Its loops have no branches that depend on the section, so that the compiler turns them into vector
+instructions: what differs between sections is chosen, not jumped over. Numbers that all sections share are copied out
+of their records before a loop.
 
+Of helical wheels, wheel 1's middle stands half the axial offset before the origin of zeta, wheel 2's half behind it.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from gearmbs.contact import layout as L
+from gearmbs.contact.gaps import derived as D
 from gearmbs.contact.records import inlined, kernel, summing
-from gearmbs.contact.support.profiles import involute_curvatures, involute_slopes, normal_turn, tilt_of
 
 NEWTON_STEPS = 20
 NEWTON_END = 1e-6  # a further step would change alpha by about the square of it
@@ -21,25 +22,48 @@ LARGEST_TURN = 0.1  # rad, for the series of sine and cosine
 NEAR_BASE = 0.003
 """Length of roll over base radius below which an involute is too curved to bear on, and goes on as a plane: the two are
 a sixth of its cube of the base radius apart, 5e-10 m at 0.1 m."""
+GENTLE = 0.02
+"""Turns of the normal below this are taken from a series."""
 
 
-class GapCurvatures(NamedTuple):
-    """Second derivatives of the separation at fixed normal, by alpha, the tilt along and across it, and the spins."""
+@inlined
+def tilt_of(side):
+    """Return the tilt, and what follows from it alone, so that loops need not load it again."""
+    return side.x[L.P], side.x[L.Q], side.w, side.i_w, side.i_1w, side.m, side.m_w, side.m_ww
 
-    alpha_alpha: float
-    alpha_A: float
-    alpha_B: float
-    alpha_F1: float
-    alpha_F2: float
-    AA: float
-    AB: float
-    BB: float
-    AF1: float
-    BF1: float
-    AF2: float
-    BF2: float
-    FF1: float
-    FF2: float
+
+@inlined
+def normal_turn(sa, ca, tilt, gentle):
+    """Turn of the normal seen from the wheel's own plane: the angle E added to alpha."""
+    p, q, w = tilt[0], tilt[1], tilt[2]
+    A = p * sa + q * ca
+    arg = A * (p * ca - q * sa) / (w * (1.0 + w) + A * A)
+    if gentle != 0.0:
+        s = arg * arg
+        return arg * (1.0 - s * (1.0 / 3.0 - s * (0.2 - s * (1.0 / 7.0 - s / 9.0))))
+    return np.arctan(arg)
+
+
+@inlined
+def helical_turns(sa, ca, t, tilt):
+    """Turns of the normal seen from the planes of a helical wheel and its mate, E -+ arcsin(t B / kappa).
+
+    By series that are exact to rounding for axes up to `search.STEEPEST_HELICAL`.
+    """
+    B = tilt[0] * ca - tilt[1] * sa
+    turn = normal_turn(sa, ca, tilt, 1.0)
+    x = t * B / np.sqrt(1.0 - B * B)
+    v = x * x
+    high = 35.0 / 1152.0 + v * (63.0 / 2816.0 + v * (231.0 / 13312.0 + v * (143.0 / 10240.0 + v * 6435.0 / 557056.0)))
+    lean = x * (1.0 + v * (1.0 / 6.0 + v * (3.0 / 40.0 + v * (5.0 / 112.0 + v * high))))
+    return turn - lean, turn + lean
+
+
+@inlined
+def helical_turn(sa, ca, t, tilt):
+    """Turn of the normal seen from the helical wheel's own plane."""
+    turn, _ = helical_turns(sa, ca, t, tilt)
+    return turn
 
 
 @inlined
@@ -50,6 +74,14 @@ def turned(sa, ca, step):
     c = 1.0 - d2 * (0.5 - d2 * (1.0 / 24.0 - d2 * (1.0 / 720.0 - d2 / 40320.0)))
     s = step * (1.0 - d2 * (1.0 / 6.0 - d2 * (1.0 / 120.0 - d2 * (1.0 / 5040.0 - d2 / 362880.0))))
     return sa * c + ca * s, ca * c - sa * s
+
+
+@inlined
+def turn_normal(strip, j, step):
+    """Turn the normal of a section by a step of Newton's method."""
+    strip.alpha[j] += step
+    strip.sin[j], strip.cos[j] = turned(strip.sin[j], strip.cos[j], step)
+    strip.step[j] = step
 
 
 @kernel
@@ -125,151 +157,118 @@ def flank_normals(side, strip, n):
 
     Leaves ``d alpha / d zeta`` of the first section in ``strip.step[0]``.
     """
-    tilt = tilt_of(side)
-    p, q, w, i_w = tilt.p, tilt.q, tilt.w, tilt.i_w
-    a, s0, rb = side.x[0], side.roll_sum, side.base_sum
+    tilt, gentle, a, s0 = tilt_of(side), side.gentle, side.x[L.A], side.roll_sum
+    rb1, rb2 = side.base_1, side.base_2
     for j in range(n):
         strip.good[j] = 1.0
     for _ in range(NEWTON_STEPS):
         for j in range(n):
             sa, ca = strip.sin[j], strip.cos[j]
-            A = p * sa + q * ca
-            B = p * ca - q * sa
-            i_k2 = 1.0 / (1.0 - B * B)
-            i_k = np.sqrt(i_k2)
-            zeta = strip.zeta[j]
             # both flanks have one sum of lengths of roll, so that their support functions add to one of the base radius
             # r_b1 + r_b2
-            s = s0 + rb * (strip.alpha[j] + normal_turn(A, B, tilt))
-            # g = a sin - 2 A zeta / w - h: its first and second derivative by alpha, with dA/dalpha = B and dB/dalpha =
-            # -A
-            g1 = a * ca - A * B * s * i_w * i_k - rb * i_k - 2.0 * B * zeta * i_w
-            g2 = s * (A * A * i_w - B * B * w * i_k2) * i_k - a * sa + 2.0 * A * zeta * i_w
-            step = -g1 / g2
-            strip.alpha[j] += step
-            strip.sin[j], strip.cos[j] = turned(sa, ca, step)
-            strip.step[j] = step
-            # d alpha / d zeta = -g_alphazeta / g_alphaalpha, g_alphazeta = -2 B / w
-            strip.rate[j] = 2.0 * B * i_w / g2
-        squared = steps_squared(strip, n)
-        if squared < NEWTON_END * NEWTON_END:
+            s = s0 + (rb1 + rb2) * (strip.alpha[j] + normal_turn(sa, ca, tilt, gentle))
+            g1, g2, across = D.flanks_normal(a, strip.zeta[j], sa, ca, s, rb1, rb2, *tilt)
+            turn_normal(strip, j, -g1 / g2)
+            # d alpha / d zeta = -g_alphazeta / g_alphaalpha
+            strip.rate[j] = -across / g2
+        if settled(strip, n):
             break
-        if steps_over(strip, n, LARGEST_TURN) > 0.0:
-            exact_turns(strip, n)
     strip.step[0] = strip.rate[0]
+
+
+@kernel
+def settled(strip, n):
+    """Whether a step of Newton's method was the last one; takes sines and cosines anew where it was large."""
+    if steps_squared(strip, n) < NEWTON_END * NEWTON_END:
+        return True
+    if steps_over(strip, n, LARGEST_TURN) > 0.0:
+        exact_turns(strip, n)
+    return False
 
 
 @kernel
 def normal_turns(side, strip, n):
     """Fill by how much the normals seen from the wheels' own planes differ from alpha."""
-    tilt = tilt_of(side)
-    p, q = tilt.p, tilt.q
+    tilt, gentle = tilt_of(side), side.gentle
     for j in range(n):
-        sa, ca = strip.sin[j], strip.cos[j]
-        strip.turn[j] = normal_turn(p * sa + q * ca, p * ca - q * sa, tilt)
+        strip.turn[j] = normal_turn(strip.sin[j], strip.cos[j], tilt, gentle)
 
 
 @kernel
 def flank_sections(side, strip, n, want):
     """Fill gaps of flank on flank, with derivatives by the pose, of tooth 0 of wheel 1 and the tooth facing it."""
-    tilt = tilt_of(side)
-    p, q, i_w, i_w3 = tilt.p, tilt.q, tilt.i_w, tilt.i_w3
-    a, rb1, rb2, rb = side.x[0], side.base_1, side.base_2, side.base_sum
+    tilt, a, rb1, rb2 = tilt_of(side), side.x[L.A], side.base_1, side.base_2
     start_1, start_2 = side.start_1, side.start_2
     normal_turns(side, strip, n)
     for j in range(n):
-        sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
-        A = p * sa + q * ca
-        B = p * ca - q * sa
-        kap = np.sqrt(1.0 - B * B)
         turn = strip.alpha[j] + strip.turn[j]
-        s1 = rb1 * (start_1 + turn)
-        s2 = rb2 * (start_2 + turn)
-        h = involute_slopes(A, B, kap, s1 + s2, rb, tilt)
-        # A / w by A and B at w^2 = 1 - A^2 - B^2: kappa^2 / w^3 and A B / w^3
-        gA = -h.A - 2.0 * zeta * kap * kap * i_w3
-        gB = -h.B - 2.0 * zeta * A * B * i_w3
-        strip.roll_1[j] = s1
-        strip.roll_2[j] = s2
+        strip.roll_1[j] = s1 = rb1 * (start_1 + turn)
+        strip.roll_2[j] = s2 = rb2 * (start_2 + turn)
         strip.kind[j] = 0.0
-        strip.gap[j] = a * sa - 2.0 * A * i_w * zeta - h.h
-        strip.grad[0, j] = sa
-        strip.grad[1, j] = 0.0
-        strip.grad[2, j] = gA * sa + gB * ca
-        strip.grad[3, j] = gA * ca - gB * sa
-        # h = kappa s / w, and s turns with each wheel by its base radius
-        strip.grad[4, j] = -kap * i_w * rb1
-        strip.grad[5, j] = -kap * i_w * rb2
+        strip.gap[j] = D.flanks_gap(
+            a, strip.zeta[j], strip.sin[j], strip.cos[j], s1 + s2, rb1, rb2, strip.grad, j, *tilt
+        )
     if want == 0:
         return
-    i_w5 = tilt.i_w5
-    # of what a turn by r_b does each wheel does its share
-    share_1, share_2 = rb1 / rb, rb2 / rb
     for j in range(n):
-        sa, ca, zeta = strip.sin[j], strip.cos[j], strip.zeta[j]
-        A = p * sa + q * ca
-        B = p * ca - q * sa
-        kap = np.sqrt(1.0 - B * B)
-        c = involute_curvatures(A, B, kap, strip.roll_1[j] + strip.roll_2[j], rb, tilt)
-        put_curvatures(
-            strip, j, sa, ca,
-            GapCurvatures(
-                2.0 * A * i_w * zeta - a * sa - c.alpha_alpha,
-                -c.alpha_A - 2.0 * zeta * A * B * i_w3,
-                -c.alpha_B - 2.0 * zeta * (i_w + B * B * i_w3),
-                -c.alpha_F * share_1,
-                -c.alpha_F * share_2,
-                -c.AA - 6.0 * zeta * kap * kap * A * i_w5,
-                -c.AB - 2.0 * zeta * (3.0 * kap * kap * B * i_w5 - 2.0 * B * i_w3),
-                -c.BB - 2.0 * zeta * A * (i_w3 + 3.0 * B * B * i_w5),
-                -c.AF * share_1,
-                -c.BF * share_1,
-                -c.AF * share_2,
-                -c.BF * share_2,
-                0.0,
-                0.0,
-            ),
-        )  # fmt: skip
+        s = strip.roll_1[j] + strip.roll_2[j]
+        D.flanks_bend(a, strip.zeta[j], strip.sin[j], strip.cos[j], s, rb1, rb2, strip.alpha_x, strip.hess, j, *tilt)
+
+
+@kernel
+def helical_normals(side, strip, n):
+    """Turn the normals of a strip onto the common normals of two helicoids; as `flank_normals`.
+
+    Those of parallel axes are known.
+    """
+    tilt, a, h, t, c = tilt_of(side), side.x[L.A], side.x[L.H], side.twist_1, helix_square(side)
+    rb1, rb2, start_1, start_2 = side.base_1, side.base_2, side.start_1, side.start_2
+    for j in range(n):
+        strip.good[j] = 1.0
+    if side.pitch_mismatch_bound == 0.0:
+        strip.step[0] = 0.0
+        return
+    for _ in range(NEWTON_STEPS):
+        for j in range(n):
+            sa, ca = strip.sin[j], strip.cos[j]
+            turn_1, turn_2 = helical_turns(sa, ca, t, tilt)
+            s1, s2 = rb1 * (start_1 + strip.alpha[j] + turn_1), rb2 * (start_2 + strip.alpha[j] + turn_2)
+            g1, g2, across = D.helicoids_normal(a, strip.zeta[j], h, sa, ca, t, c, s1, s2, rb1, rb2, *tilt)
+            turn_normal(strip, j, -g1 / g2)
+            strip.rate[j] = -across / g2
+        if settled(strip, n):
+            break
+    strip.step[0] = strip.rate[0]
 
 
 @inlined
-def put_curvatures(strip, j, sa, ca, c):
-    """Fill the gap's Hessian and d alpha / dx of section ``j`` by eliminating alpha from second derivatives."""
-    # along stationary alpha g_xx - g_xalpha g_alphax / g_alphaalpha; e = d alpha / dx
-    inverse = -1.0 / c.alpha_alpha
-    d2 = c.alpha_A * sa + c.alpha_B * ca
-    d3 = c.alpha_A * ca - c.alpha_B * sa
-    d4, d5 = c.alpha_F1, c.alpha_F2
-    e0, e2, e3, e4, e5 = ca * inverse, d2 * inverse, d3 * inverse, d4 * inverse, d5 * inverse
-    strip.alpha_x[0, j] = e0
-    strip.alpha_x[1, j] = 0.0
-    strip.alpha_x[2, j] = e2
-    strip.alpha_x[3, j] = e3
-    strip.alpha_x[4, j] = e4
-    strip.alpha_x[5, j] = e5
-    hess = strip.hess
-    hess[0, 0, j] = ca * e0
-    hess[0, 2, j] = d2 * e0
-    hess[0, 3, j] = d3 * e0
-    hess[0, 4, j] = d4 * e0
-    hess[0, 5, j] = d5 * e0
-    # A and B turn with alpha: p and q are A sin + B cos and A cos - B sin
-    hess[2, 2, j] = d2 * e2 + c.AA * sa * sa + 2.0 * c.AB * sa * ca + c.BB * ca * ca
-    hess[2, 3, j] = d3 * e2 + (c.AA - c.BB) * sa * ca + c.AB * (ca * ca - sa * sa)
-    hess[2, 4, j] = d4 * e2 + c.AF1 * sa + c.BF1 * ca
-    hess[2, 5, j] = d5 * e2 + c.AF2 * sa + c.BF2 * ca
-    hess[3, 3, j] = d3 * e3 + c.AA * ca * ca - 2.0 * c.AB * sa * ca + c.BB * sa * sa
-    hess[3, 4, j] = d4 * e3 + c.AF1 * ca - c.BF1 * sa
-    hess[3, 5, j] = d5 * e3 + c.AF2 * ca - c.BF2 * sa
-    hess[4, 4, j] = d4 * e4 + c.FF1
-    hess[4, 5, j] = d5 * e4
-    hess[5, 5, j] = d5 * e5 + c.FF2
-    hess[0, 1, j] = 0.0
-    hess[1, 1, j] = 0.0
-    hess[1, 2, j] = 0.0
-    hess[1, 3, j] = 0.0
-    hess[1, 4, j] = 0.0
-    hess[1, 5, j] = 0.0
+def helix_square(side):
+    """Return 1 + t^2 of the base helix."""
+    return 1.0 + side.twist_1 * side.twist_1
+
+
+@kernel
+def helical_flanks(side, strip, n, want):
+    """Fill gaps of helicoid on helicoid, with derivatives by the pose; as `flank_sections`."""
+    tilt, a, h, t, c = tilt_of(side), side.x[L.A], side.x[L.H], side.twist_1, helix_square(side)
+    rb1, rb2, start_1, start_2 = side.base_1, side.base_2, side.start_1, side.start_2
+    for j in range(n):
+        sa, ca = strip.sin[j], strip.cos[j]
+        turn_1, turn_2 = helical_turns(sa, ca, t, tilt)
+        s1, s2 = rb1 * (start_1 + strip.alpha[j] + turn_1), rb2 * (start_2 + strip.alpha[j] + turn_2)
+        strip.kind[j] = 0.0
+        strip.gap[j], strip.roll_1[j], strip.roll_2[j] = D.helicoids_gap(
+            a, strip.zeta[j], h, sa, ca, t, c, s1, s2, rb1, rb2, strip.grad, j, *tilt
+        )
+    if want == 0:
+        return
+    for j in range(n):
+        sa, ca = strip.sin[j], strip.cos[j]
+        turn_1, turn_2 = helical_turns(sa, ca, t, tilt)
+        s1, s2 = rb1 * (start_1 + strip.alpha[j] + turn_1), rb2 * (start_2 + strip.alpha[j] + turn_2)
+        D.helicoids_bend(
+            a, strip.zeta[j], h, sa, ca, t, c, s1, s2, rb1, rb2, strip.alpha_x, strip.hess, j, *tilt
+        )  # fmt: skip
 
 
 @kernel

@@ -229,7 +229,7 @@ class Value:
     def partials(self) -> Iterable[tuple[Value, Value]]:
         """Yield the operands and the derivatives by them."""
         kind, (a, b) = self.operation, (*self.operands, None, None)[:2]
-        if kind == "given":
+        if kind == "given" or self._partials:
             yield from self._partials.items()
         elif kind in "+-":
             yield from ((a, ONE), (b, ONE if kind == "+" else -ONE))
@@ -402,7 +402,7 @@ def inputs(names: str, array: str = "", first: int | str = 0) -> list[Value]:
 
 
 def given(value: Value, partials: Mapping[Value, Any]) -> Value:
-    """Say what derivatives an argument has, by other values; all else is taken for constant. Return it."""
+    """Say what derivatives an argument, or a value, has by others; all else is taken for constant. Return it."""
     value._partials = {by: value_of(slope) for by, slope in partials.items()}
     return value
 

@@ -7,7 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gearmbs.kernels.derive import Function, Value, derivative, given, inputs, product, slopes
+from gearmbs.kernels.derive import (
+    ONE,
+    Function,
+    Value,
+    choose,
+    derivative,
+    given,
+    inputs,
+    product,
+    slopes,
+    tangent,
+)
 
 COMPILED = 'error_model="numpy", fastmath={"contract": True, "arcp": True}'
 
@@ -100,5 +111,70 @@ def ends() -> list[Function]:
     ]
 
 
+def roll_of_flanks(a, h, p, q, f1, f2, zeta, own, twist, sign, rb1, rb2, alpha, length):
+    """Return the length of roll half-way between two flanks, axes taken as parallel but for what a tilt moves first.
+
+    s = (r_b1 F_1 - r_b2 F_2 + (r_b1 - r_b2) alpha + L) / 2 on wheel 1, with the other sign but for L on wheel 2. A tilt
+    turns the normal of a section by 2 zeta (q / a - p R_b / (a L)), a helix the tooth by the place along the axis.
+    """
+    turned = q / a - p * (rb1 + rb2) / (a * length)
+    apart = rb1 * f1 - rb2 * f2 + (rb1 - rb2) * alpha
+    return 0.5 * (sign * apart + length) + 2.0 * (zeta * own) * turned - twist * (zeta + sign * (0.5 * h))
+
+
+def foot_square(a, p, q, zeta, r, se, ce, mate):
+    """Return the square of the mate's length of roll under a tip corner: P^2 - r_b^2, P from the mate's axis."""
+    x, y = a - r * ce - 2.0 * (p * zeta), -(r * se) - 2.0 * (q * zeta)
+    return x * x + y * y - mate * mate
+
+
+def rolls() -> list[Function]:
+    """cos alpha = R_b / a and L^2 = a^2 - R_b^2, so that alpha_a = R_b / (a L) and L_a = a / L."""
+    by = a, h, p, q, f1, f2 = inputs("a h p q f1 f2")
+    zeta, own, twist, sign, rb1, rb2, alpha, length = inputs("zeta own twist sign rb1 rb2 alpha length")
+    given(length, {a: a / length})
+    given(alpha, {a: (rb1 + rb2) / (a * length)})
+    roll = roll_of_flanks(a, h, p, q, f1, f2, zeta, own, twist, sign, rb1, rb2, alpha, length)
+    first = slopes(roll, by)
+    second = [slopes(one, by) for one in first]
+    told = "a, h, p, q, f1, f2, zeta, own, twist, sign, rb1, rb2, alpha, length, grad, hess"
+    return [
+        Function("flanks_roll", told, "Return the length of roll of flank on flank, write its derivatives.", [roll],
+                 sets=vector("grad", first) | matrix("hess", second)),
+        *foot(),
+    ]  # fmt: skip
+
+
+def foot() -> list[Function]:
+    """A helical tip edge turns by -k per length of its wheel: w (eta - eta_0) + k (Z + r (p cos + q sin)) = 0."""
+    a, h, p, q, zeta, r, se, ce, own, s, k, w = inputs("a h p q zeta r se ce own s k w")
+    (mate,), (eta, spin) = inputs("mate"), inputs("_eta _F")
+    square = foot_square(a, p, q, zeta, r, se, ce, mate)
+    given(se, {eta: ce})
+    given(ce, {eta: -se})
+    given(w, {p: -(p / w), q: -(q / w)})
+    along = k * (zeta + own * (0.5 * h) + r * (p * ce + q * se))
+    behind = given(along / w, {eta: -ONE, spin: ONE})
+    edge = along - w * behind
+    by_eta = derivative(edge, eta)
+    moves = [{x: ONE, eta: -(derivative(edge, x) / by_eta)} for x in (a, h, p, q, spin)]
+    given(s, {x: 0.5 * (derivative(square, x) / s) for x in (a, p, q, eta)})
+    first = [tangent(s, move) for move in moves]
+    second = [[tangent(first[min(i, k)], moves[max(i, k)]) for k in range(5)] for i in range(5)]
+    # the spin is wheel 1's where the corner is, else wheel 2's
+    at_1, at_2 = [choose(own, 0.0, x, y) for x, y in ((1.0, 0.0), (0.0, 1.0))]
+    shares = [*([ONE] * 4), at_1, at_2]
+    wide = [0, 1, 2, 3, 4, 4]
+    grad = [first[i] * shares[n] for n, i in enumerate(wide)]
+    hess = [[second[i][k] * (shares[n] * shares[m]) for m, k in enumerate(wide)] for n, i in enumerate(wide)]
+    told = "a, h, p, q, zeta, r, se, ce, own, s, k, w"
+    return [
+        Function("foot_square", "a, p, q, zeta, r, se, ce, mate", "Return the square of the length of roll.", [square]),
+        Function("foot_slopes", f"{told}, grad", "Add the gradient of the length of roll under a corner.",
+                 adds=vector("grad", grad)),
+        Function("foot_bends", f"{told}, hess", "Add its Hessian.", adds=matrix("hess", hess)),
+    ]  # fmt: skip
+
+
 def functions() -> list[Function]:
-    return [*pose(), *ends()]
+    return [*pose(), *ends(), *rolls()]

@@ -351,3 +351,203 @@ def end_curves(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other, mate, tot
     hess[4, 4] = 0.0
     hess[4, 5] = 0.0
     hess[5, 5] = 0.0
+
+
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+def flanks_roll(a, h, p, q, f1, f2, zeta, own, twist, sign, rb1, rb2, alpha, length, grad, hess):
+    """Return the length of roll of flank on flank, write its derivatives."""
+    _0 = rb1 - rb2
+    _1 = 1.0 / a  # d turned / d q
+    _2 = 1.0 / (a * length)
+    _3 = rb1 + rb2
+    _4 = p * _3
+    _5 = zeta * own
+    _6 = 0.5 * (length + sign * (f1 * rb1 - (f2 * rb2) + alpha * _0)) + 2.0 * ((q * _1 - (_2 * _4)) * _5) - (twist * (zeta + 0.5 * (h * sign)))  # roll
+    _7 = 1.0 / length
+    _8 = a * _7  # d length / d a
+    _9 = _3 * _2  # d alpha / d a
+    _10 = _2 * _2
+    _11 = length + a * _8
+    _12 = _10 * _11
+    _13 = _1 * _1
+    _14 = _7 - (a * (_8 * (_7 * _7)))  # d (d length / d a) / d a
+    _15 = _3 * _12  # d (d turned / d a) / d p
+    _16 = 0.5 * (_14 - (sign * (_0 * _15))) + 2.0 * (_5 * (_4 * (_10 * (_8 + _8 + a * _14) - (2.0 * (_11 * (_2 * _12)))) + 2.0 * (q * (_1 * _13))))  # d (d roll / d a) / d a
+    _17 = 2.0 * (_5 * _15)  # d (d roll / d a) / d p
+    grad[0] = 0.5 * (_8 + sign * (_9 * _0)) + 2.0 * (_5 * (_4 * _12 - (q * _13)))
+    grad[1] = -(0.5 * (twist * sign))
+    grad[2] = -(2.0 * (_9 * _5))
+    grad[3] = 2.0 * (_1 * _5)
+    grad[4] = 0.5 * (sign * rb1)
+    grad[5] = -(0.5 * (sign * rb2))
+    hess[0, 0] = _16
+    hess[0, 1] = 0.0
+    hess[0, 2] = _17
+    hess[0, 3] = -(2.0 * (_5 * _13))
+    hess[0, 4] = 0.0
+    hess[0, 5] = 0.0
+    hess[1, 0] = 0.0
+    hess[1, 1] = 0.0
+    hess[1, 2] = 0.0
+    hess[1, 3] = 0.0
+    hess[1, 4] = 0.0
+    hess[1, 5] = 0.0
+    hess[2, 0] = _17
+    hess[2, 1] = 0.0
+    hess[2, 2] = 0.0
+    hess[2, 3] = 0.0
+    hess[2, 4] = 0.0
+    hess[2, 5] = 0.0
+    hess[3, 0] = -(2.0 * (_5 * _13))
+    hess[3, 1] = 0.0
+    hess[3, 2] = 0.0
+    hess[3, 3] = 0.0
+    hess[3, 4] = 0.0
+    hess[3, 5] = 0.0
+    hess[4, 0] = 0.0
+    hess[4, 1] = 0.0
+    hess[4, 2] = 0.0
+    hess[4, 3] = 0.0
+    hess[4, 4] = 0.0
+    hess[4, 5] = 0.0
+    hess[5, 0] = 0.0
+    hess[5, 1] = 0.0
+    hess[5, 2] = 0.0
+    hess[5, 3] = 0.0
+    hess[5, 4] = 0.0
+    hess[5, 5] = 0.0
+    return _6
+
+
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+def foot_square(a, p, q, zeta, r, se, ce, mate):
+    """Return the square of the length of roll."""
+    _0 = a - (r * ce) - (2.0 * (p * zeta))  # x
+    _1 = r * se + 2.0 * (q * zeta)
+    return _0 * _0 + _1 * _1 - (mate * mate)
+
+
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+def foot_slopes(a, h, p, q, zeta, r, se, ce, own, s, k, w, grad):
+    """Add the gradient of the length of roll under a corner."""
+    _0 = r * ce  # d (d x / d _eta) / d _eta
+    _1 = a - _0 - (2.0 * (p * zeta))  # x
+    _2 = 1.0 / s
+    _3 = 1.0 / (w + k * (r * (q * ce - (p * se))))
+    _4 = r * se  # d x / d _eta
+    _5 = _4 + 2.0 * (q * zeta)
+    _6 = _2 * (2.0 * (_1 * _4) + 2.0 * (_0 * _5))
+    _7 = 1.0 / w
+    _8 = _7 * (k * (zeta + 0.5 * (h * own) + r * (p * ce + q * se)))  # behind
+    _9 = w * _3 * _6
+    grad[0] += _1 * _2
+    grad[1] -= 0.25 * (_3 * (own * k) * _6)
+    grad[2] -= 2.0 * (_2 * (zeta * _1)) + 0.5 * ((_3 * (k * _0 + p * _7 * _8)) * _6)
+    grad[3] += 2.0 * (_2 * (zeta * _5)) - (0.5 * ((_3 * (k * _4 + q * _7 * _8)) * _6))
+    grad[4] += 0.5 * (_9 * (1.0 if own > 0.0 else 0.0))
+    grad[5] += 0.5 * (_9 * (0.0 if own > 0.0 else 1.0))
+
+
+@njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
+def foot_bends(a, h, p, q, zeta, r, se, ce, own, s, k, w, hess):
+    """Add its Hessian."""
+    _0 = 1.0 / s
+    _1 = r * ce  # d (d x / d _eta) / d _eta
+    _2 = a - _1 - (2.0 * (p * zeta))  # x
+    _3 = _0 * _0
+    _4 = 1.0 / (w + k * (r * (q * ce - (p * se))))
+    _5 = own * k
+    _6 = _4 * _5
+    _7 = r * se  # d x / d _eta
+    _8 = _7 + 2.0 * (q * zeta)
+    _9 = 2.0 * (_2 * _7) + 2.0 * (_1 * _8)  # d square / d _eta
+    _10 = _0 * _9
+    _11 = _10 * _3
+    _12 = _7 * _0 - (0.5 * (_2 * _11))  # d (d s / d a) / d _eta
+    _13 = zeta * _2
+    _14 = _0 * _13 * _3
+    _15 = k * _1  # d along / d p
+    _16 = 1.0 / w
+    _17 = p * _16  # d (d edge / d p) / d _F
+    _18 = r * (p * ce + q * se)
+    _19 = _16 * (k * (zeta + 0.5 * (h * own) + _18))  # behind
+    _20 = _15 + _17 * _19  # d edge / d p
+    _21 = _4 * _20
+    _22 = 2.0 * (_2 * _14) - (2.0 * (zeta * _0)) - (_21 * _12)
+    _23 = zeta * _8
+    _24 = _0 * _23 * _3
+    _25 = k * _7  # d along / d q
+    _26 = q * _16  # d (d edge / d q) / d _F
+    _27 = _25 + _26 * _19  # d edge / d q
+    _28 = _4 * _27
+    _29 = w * _4
+    _30 = _29 * _12
+    _31 = (1.0 if own > 0.0 else 0.0)  # at_1
+    _32 = _30 * _31
+    _33 = (0.0 if own > 0.0 else 1.0)  # at_2
+    _34 = _30 * _33
+    _35 = _4 * _4
+    _36 = _35 * (k * _18)
+    _37 = _0 * (2.0 * (_7 * _7 + _1 * _2) + 2.0 * (_1 * _1 - (_7 * _8))) - (0.5 * (_9 * _11))
+    _38 = _10 * (_5 * _36) + _6 * _37
+    _39 = _17 + _25
+    _40 = _35 * _39
+    _41 = _0 * (zeta * _7)
+    _42 = 2.0 * (_9 * _14) - (4.0 * _41)
+    _43 = 0.25 * (_21 * _38) - (0.25 * (_10 * (_5 * _40) + _6 * _42))
+    _44 = _0 * (zeta * _1)
+    _45 = 4.0 * _44 - (2.0 * (_9 * _24))
+    _46 = _15 - _26  # d by_eta / d q
+    _47 = _35 * _46
+    _48 = 0.25 * (_28 * _38) - (0.25 * (_6 * _45 - (_10 * (_5 * _47))))
+    _49 = _29 * _38
+    _50 = 2.0 * (_41 - (0.5 * (_13 * _11))) + 0.5 * (_10 * (_20 * _36 - (_4 * _39)) + _21 * _37)
+    _51 = 2.0 * (_0 * (zeta * zeta))
+    _52 = _16 * _16
+    _53 = _21 * _50 - (2.0 * (2.0 * (_13 * _14) - _51) + 0.5 * (_10 * (_20 * _40 + _4 * (_19 * (_16 + p * (_17 * _52)))) + _21 * _42))
+    _54 = _26 * _52
+    _55 = _28 * _50 - (0.5 * (_10 * (_4 * (_19 * (p * _54)) - (_20 * _47)) + _21 * _45) - (4.0 * (_13 * _24)))
+    _56 = 0.5 * (_10 * (_17 * _4)) + _29 * _50
+    _57 = 2.0 * (_44 - (0.5 * (_23 * _11))) - (0.5 * (_10 * (_27 * _36 + _4 * _46) + _28 * _37))  # d grad[3] / d _eta
+    _58 = 2.0 * (_51 - (2.0 * (_23 * _24))) - (0.5 * (_10 * (_4 * (_19 * (_16 + q * _54)) - (_27 * _47)) + _28 * _45)) - (_28 * _57)
+    _59 = _29 * _57 - (0.5 * (_10 * (_26 * _4)))
+    _60 = _59 * _31
+    _61 = _59 * _33
+    _62 = _29 * (_10 * (w * _36) + _29 * _37)
+    _63 = 0.5 * (_62 * (_31 * _33))
+    hess[0, 0] += _0 - (_2 * (_2 * _0 * _3))
+    hess[0, 1] -= 0.5 * (_6 * _12)
+    hess[0, 2] += _22
+    hess[0, 3] -= 2.0 * (_2 * _24) + _28 * _12
+    hess[0, 4] += _32
+    hess[0, 5] += _34
+    hess[1, 0] -= 0.5 * (_6 * _12)
+    hess[1, 1] += 0.125 * (_6 * _38)
+    hess[1, 2] += _43
+    hess[1, 3] += _48
+    hess[1, 4] -= 0.25 * (_49 * _31)
+    hess[1, 5] -= 0.25 * (_49 * _33)
+    hess[2, 0] += _22
+    hess[2, 1] += _43
+    hess[2, 2] += _53
+    hess[2, 3] += _55
+    hess[2, 4] -= _56 * _31
+    hess[2, 5] -= _56 * _33
+    hess[3, 0] -= 2.0 * (_2 * _24) + _28 * _12
+    hess[3, 1] += _48
+    hess[3, 2] += _55
+    hess[3, 3] += _58
+    hess[3, 4] += _60
+    hess[3, 5] += _61
+    hess[4, 0] += _32
+    hess[4, 1] -= 0.25 * (_49 * _31)
+    hess[4, 2] -= _56 * _31
+    hess[4, 3] += _60
+    hess[4, 4] += 0.5 * (_62 * (_31 * _31))
+    hess[4, 5] += _63
+    hess[5, 0] += _34
+    hess[5, 1] -= 0.25 * (_49 * _33)
+    hess[5, 2] -= _56 * _33
+    hess[5, 3] += _61
+    hess[5, 4] += _63
+    hess[5, 5] += 0.5 * (_62 * (_33 * _33))

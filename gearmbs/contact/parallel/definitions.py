@@ -1,7 +1,7 @@
 """Contact of wheels about two fixed parallel axes, each law stated once: `gearmbs.kernels.derive` makes ``derived.py``.
 
 The gap of the general section, at no tilt: with the normal (sin alpha, cos alpha) and h_i as in
-`gearmbs.contact.support.definitions`,
+`gearmbs.contact.gaps.definitions`,
 
     g = a sin(alpha) - h_1 - h_2,
     h = r_b (phi + psi + alpha) = s of an involute,    h = r sin(alpha + eta) + rho of a tip corner.
