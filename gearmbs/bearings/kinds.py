@@ -20,6 +20,12 @@ class BearingError(ValueError):
     """A bearing cannot be what is meant: a field, a name or a value is wrong; the message says what would do."""
 
 
+Loads = float | np.ndarray
+"""One load or some, N."""
+Factors = tuple[Loads, ...]
+"""e, X and Y of loads, each one number for all or one for each."""
+
+
 def require(condition: bool, message: str) -> None:
     """Raise BearingError with the message unless the condition holds."""
     if not condition:
@@ -111,7 +117,8 @@ class Kind:
     rated_rows : int
         Rows i that ratings count: makers count the two paths of a four-point bearing so.
     load_factors : callable
-        ``load_factors(bearing, radial, axial)`` returns e, X and Y of ISO 281, and Y below e where that is not zero.
+        ``load_factors(bearing, radial, axial)`` returns e, X and Y of ISO 281, and Y below e where that is not zero, of
+        one pair of loads or of as many as there are.
     designation : re.Pattern, optional
         Beginning of designations: its letters and digits of the series, code of the bore.
     series : dict
@@ -139,7 +146,7 @@ class Kind:
     reduction: float
     steel: float = 1.0
     rated_rows: int = 1
-    load_factors: Callable[[Bearing, float, float], tuple[float, ...]]
+    load_factors: Callable[[Bearing, Loads, Loads], Factors]
     designation: re.Pattern[str] | None = None
     series: dict[str, str] = field(default_factory=dict)
     tapers: bool = False
@@ -198,8 +205,16 @@ DOUBLE_ANGULAR: dict[float, tuple[tuple[float, ...], ...]] = {
 two rows, by contact angle in degrees and level."""
 
 
-def _by_angle(bearing: Bearing, axial: float, table: dict[float, tuple[tuple[float, ...], ...]]) -> tuple[float, ...]:
-    """Return the row of a table for a bearing's contact angle and axial load, between its rows on straight lines."""
+def _refuse_first(refused: Any, radial: Loads, axial: Loads, message: str, kind: str) -> None:
+    """Raise BearingError with the first of some loads that a bearing does not carry."""
+    found = np.flatnonzero(refused)
+    if found.size:
+        across, along = (float(np.atleast_1d(load)[found[0]]) for load in (radial, axial))
+        raise BearingError(message.format(radial=across, axial=along, kind=kind))
+
+
+def _by_angle(bearing: Bearing, axial: Loads, table: dict[float, tuple[tuple[float, ...], ...]]) -> Factors:
+    """Return the row of a table for a bearing's contact angle and axial loads, between its rows on straight lines."""
     degrees, angles = math.degrees(bearing.contact_angle), list(table)
     require(
         angles[0] <= degrees <= angles[-1],
@@ -210,24 +225,24 @@ def _by_angle(bearing: Bearing, axial: float, table: dict[float, tuple[tuple[flo
     level = axial / (count * (1e3 * bearing.element_diameter) ** 2)
     k = min(int(np.searchsorted(angles, degrees, side="right")) - 1, len(angles) - 2)
     share = (degrees - angles[k]) / (angles[k + 1] - angles[k])
-    ends = [[float(np.interp(level, _LEVELS, column)) for column in zip(*table[angles[j]])] for j in (k, k + 1)]
+    ends = [[np.interp(level, _LEVELS, column) for column in zip(*table[angles[j]])] for j in (k, k + 1)]
     return tuple((1.0 - share) * low + share * high for low, high in zip(*ends))
 
 
-def _single_row_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
+def _single_row_factors(bearing: Bearing, radial: Loads, axial: Loads) -> Factors:
     return _by_angle(bearing, axial, ANGULAR)
 
 
-def _double_angular_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
+def _double_angular_factors(bearing: Bearing, radial: Loads, axial: Loads) -> Factors:
     return _by_angle(bearing, axial, DOUBLE_ANGULAR)
 
 
-def _self_aligning_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
+def _self_aligning_factors(bearing: Bearing, radial: Loads, axial: Loads) -> Factors:
     slope = math.tan(bearing.contact_angle)
     return 1.5 * slope, 0.65, 0.65 / slope, 0.42 / slope
 
 
-def _spherical_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, ...]:
+def _spherical_factors(bearing: Bearing, radial: Loads, axial: Loads) -> Factors:
     slope = math.tan(bearing.contact_angle)
     return 1.5 * slope, 0.67, 0.67 / slope, 0.45 / slope
 
@@ -237,16 +252,16 @@ TILTED = math.radians(4.0 / 60.0)
 cylindrical roller bearings lean."""
 
 
-def _cylindrical_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
-    require(
-        axial <= TILTED * max(radial, 1.0),
-        f"F_a is {axial:.4g} N beside F_r of {radial:.4g} N, and a {bearing.kind} bearing carries no axial load: let "
-        "another bearing locate the shaft, with axial stiffness 0 here, or take a kind that does",
-    )
+def _cylindrical_factors(bearing: Bearing, radial: Loads, axial: Loads) -> Factors:
+    _refuse_first(
+        axial > TILTED * np.maximum(radial, 1.0), radial, axial,
+        "F_a is {axial:.4g} N beside F_r of {radial:.4g} N, and a {kind} bearing carries no axial load: let another "
+        "bearing locate the shaft, with axial stiffness 0 here, or take a kind that does", bearing.kind,
+    )  # fmt: skip
     return math.inf, 1.0, 0.0
 
 
-def _tapered_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
+def _tapered_factors(bearing: Bearing, radial: Loads, axial: Loads) -> Factors:
     return 1.5 * math.tan(bearing.contact_angle), 0.4, 0.4 / math.tan(bearing.contact_angle)
 
 
@@ -255,12 +270,12 @@ LEANING = 0.05
 degrees: their loads are 0.1 % larger, and the life is that of the axial load."""
 
 
-def _thrust_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, float, float]:
-    require(
-        radial <= LEANING * max(axial, 1.0),
-        f"F_r is {radial:.4g} N beside F_a of {axial:.4g} N, and a {bearing.kind} bearing carries no radial load: let "
-        "another bearing hold the shaft across its axis",
-    )
+def _thrust_factors(bearing: Bearing, radial: Loads, axial: Loads) -> Factors:
+    _refuse_first(
+        radial > LEANING * np.maximum(axial, 1.0), radial, axial,
+        "F_r is {radial:.4g} N beside F_a of {axial:.4g} N, and a {kind} bearing carries no radial load: let another "
+        "bearing hold the shaft across its axis", bearing.kind,
+    )  # fmt: skip
     return 0.0, 0.0, 1.0
 
 

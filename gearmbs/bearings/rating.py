@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearmbs.bearings.kinds import KINDS, BearingError, require
+from gearmbs.bearings.kinds import KINDS, BearingError, Loads, require
 from gearmbs.bearings.laws_kernel import groove_contact
 from gearmbs.units import Quantity, to_si
 
@@ -129,9 +129,17 @@ def load_factors(bearing: Bearing, radial: float, axial: float) -> tuple[float, 
     BearingError
         For cylindrical rollers under axial load, and contact angles outside the standard's table.
     """
-    radial, axial = abs(radial), abs(axial)
+    x, y = _factors(bearing, abs(radial), abs(axial))
+    return float(x), float(y)
+
+
+def _factors(bearing: Bearing, radial: Loads, axial: Loads) -> tuple[np.ndarray, np.ndarray]:
+    """Return X and Y of loads that are not negative; see `load_factors`."""
     e, x, y, *below = KINDS[bearing.kind].load_factors(bearing, radial, axial)
-    return (1.0, below[0] if below else 0.0) if axial <= e * radial else (x, y)
+    # e is infinite of rollers that carry no axial load, which need not have a radial one
+    with np.errstate(invalid="ignore"):
+        is_below = axial <= np.multiply(e, radial)
+    return np.where(is_below, 1.0, x), np.where(is_below, below[0] if below else 0.0, y)
 
 
 ROUNDS = 8
@@ -150,7 +158,7 @@ def induced_thrust(bearing: Bearing, radial: float, axial: float = 0.0) -> float
     """
     if KINDS[bearing.kind].thrust != "one way" or KINDS[bearing.kind].axial:
         return 0.0
-    e, _, y, *_ = KINDS[bearing.kind].load_factors(bearing, abs(radial), abs(axial))
+    e, _, y = map(float, KINDS[bearing.kind].load_factors(bearing, abs(radial), abs(axial))[:3])
     return abs(radial) / (2.0 * y) if bearing.rollers else e * abs(radial)
 
 
@@ -263,5 +271,7 @@ def mean_load(
         require(bool(np.isfinite(value).all()), f"{name} has values that are not finite; leave these instants out")
     require(bool(turns.any()), "speed is 0 throughout: a bearing at rest has no life in revolutions; see static_rating")
     p = life_exponent(bearing)
-    loads = np.array([equivalent_load(bearing, r, a) for r, a in zip(radial, axial)])
+    across, along = np.abs(radial), np.abs(axial)
+    x, y = _factors(bearing, across, along)
+    loads = np.maximum(across, x * across + y * along)
     return float((np.sum(turns * loads**p) / np.sum(turns)) ** (1.0 / p))

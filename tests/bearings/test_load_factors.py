@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import warnings
 
+import numpy as np
 import pytest
 
-from gearmbs.bearings import Bearing, BearingError, equivalent_load
+from gearmbs.bearings import Bearing, BearingError, equivalent_load, mean_load
 from gearmbs.bearings.kinds import ANGULAR, DOUBLE_ANGULAR, TILTED
-from gearmbs.bearings.rating import induced_thrust, load_factors, paired_thrust
+from gearmbs.bearings.rating import induced_thrust, life_exponent, load_factors, paired_thrust
 from tests.says import says
 
 BALLS = {"elements": 12, "element_diameter": "10 mm", "pitch_diameter": "46 mm"}
@@ -114,3 +115,27 @@ def test_reinforced_designs_are_told_to_have_the_ratings_of_the_basic_one():
         Bearing.from_designation("NU208 ECP", estimate=True)
     assert own.rating == 17800.0
     assert not [one for one in said if "basic" in str(one.message)]
+
+
+@pytest.mark.parametrize("designation", ["6206", "7206C", "QJ206", "1206", "22206", "NU206", "30206", "51106"])
+def test_a_mean_load_is_that_of_the_equivalent_loads_one_by_one(designation):
+    bearing = Bearing.from_designation(designation, estimate=True)
+    draw = np.random.default_rng(206)
+    radial, axial = draw.uniform(-3000.0, 3000.0, 60), draw.uniform(-2000.0, 2000.0, 60)
+    radial[0] = axial[1] = 0.0
+    if designation.startswith("NU"):
+        axial *= 0.0
+    if designation.startswith("51"):
+        radial = 0.04 * axial
+    p = life_exponent(bearing)
+    loads = np.array([equivalent_load(bearing, *pair) for pair in zip(radial, axial)])
+    assert mean_load(bearing, radial, axial) == pytest.approx(np.mean(loads**p) ** (1.0 / p), rel=1e-14)
+
+
+def test_the_first_load_that_a_bearing_does_not_carry_is_named():
+    rollers = Bearing.from_designation("NU206", estimate=True)
+    with pytest.raises(BearingError, match=says("F_a", "300 N", "2000 N")):
+        mean_load(rollers, np.array([1000.0, 2000.0, 3000.0]), np.array([0.0, -300.0, 400.0]))
+    thrust = Bearing.from_designation("51106", estimate=True)
+    with pytest.raises(BearingError, match=says("F_r", "200 N", "1000 N")):
+        mean_load(thrust, np.array([10.0, 200.0]), np.array([1000.0, 1000.0]))
