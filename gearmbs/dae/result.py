@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numba import float64, int64, types
@@ -369,6 +369,25 @@ class SolverStats:
         )
 
 
+class Kept(NamedTuple):
+    """Where a run was at the end of one of its steps.
+
+    Attributes
+    ----------
+    t : float
+        s.
+    y, yp : ndarray, shape (n,)
+    idata, rdata : ndarray
+        The tables of integers and numbers there.
+    """
+
+    t: float
+    y: np.ndarray
+    yp: np.ndarray
+    idata: np.ndarray
+    rdata: np.ndarray
+
+
 @dataclass
 class DAEResult:
     """Solution of a DAE G(t, y, y') = 0.
@@ -400,6 +419,8 @@ class DAEResult:
         What stood at each output in the places of the problem's `Counted`; None where outputs are steps.
     t_last : float
         Time the integration reached, which may lie beyond the last output.
+    kept : Kept or None
+        The state that was asked for by ``keep_at``.
     checkpoint : object or None
         State of an interrupted run, to go on from.
     """
@@ -417,6 +438,7 @@ class DAEResult:
     held: tuple[np.ndarray, np.ndarray] | None = None
     counted: np.ndarray | None = None
     t_last: float = float("nan")
+    kept: Kept | None = None
     checkpoint: Any = None
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.dae import Status
+from gearmbs.dae.methods import DEFAULT
 from gearmbs.dae.results.solution import Solution
 from gearmbs.drivetrain.members.pins import pin_bearing
 from gearmbs.drivetrain.members.pins import rolling_pins as rolling_pins
@@ -28,7 +29,8 @@ from gearmbs.studies.case.section import CaseError
 from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.run.accuracy import asked_accuracy
 from gearmbs.studies.run.recorder import TURN_BEFORE
-from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines, time_apart
+from gearmbs.studies.run.refined import LEFT_TO_TWIN, Behind, keeping
+from gearmbs.studies.train_accuracy import SMALLEST, Lines, Precise, accurate_lines, time_apart
 from gearmbs.units import Quantity, QuantityLike, to_si
 
 MEMBERS = ("sun", "carrier", "ring")
@@ -182,7 +184,7 @@ def run_planetary(
     """
     if accuracy is None:
         return _run(run, progress)[0]
-    wanted, gears = asked_accuracy(accuracy), run.gears
+    wanted, gears = asked_accuracy(accuracy, smallest=SMALLEST), run.gears
     if run.tolerance is not None:
         raise CaseError(
             f"{gears.name}: accuracy = {accuracy!r}: the tolerance is chosen for it, but operation.tolerance is "
@@ -198,12 +200,22 @@ def run_planetary(
     orders = np.arange(1, HARMONICS + 1)
     names = [f"force of {name}" for name in _meshes(gears)]
 
+    behind: Behind | None = None
+
     def lines(precise: Precise) -> Lines:
+        nonlocal behind
         sliced = precise.slices.get("set", count)
         one = run if sliced == count else replace(run, gears=replace(gears, slices=sliced))
         # one sample more than the half, lest rounding left one out
         duration = half / rate + 1.0 / rate if precise.half else run.duration
-        record, forces = _run(replace(one, tolerance=precise.tolerance, duration=duration), progress)
+        one = replace(one, tolerance=precise.tolerance, duration=duration)
+        start: dict[str, Any] = {}
+        if run.rim is None and not precise.half:
+            start = keeping(DEFAULT, run.run_up + LEFT_TO_TWIN * run.settling)
+        elif behind is not None:
+            start = behind.start(sliced)
+        record, forces, made = _run(one, progress, start.pop("mechanism", None), **start)
+        behind = replace(made, slices=sliced)
         frequency = abs(record.attrs["frequency_mesh"])
         if half * frequency < MIN_PERIODS * rate or not HARMONICS * frequency < 0.5 * rate:
             raise CaseError(
@@ -234,18 +246,20 @@ def run_planetary(
     return accurate_lines(lines, precise, wanted, groups, "mesh_rms", f"planetary set '{gears.name}'")
 
 
-def _run(run: PlanetaryRun, progress: Callable[[float], None] | None) -> tuple[xr.Dataset, np.ndarray]:
-    """Return the record of a planetary set, and the forces of its meshes, (m, 2 planets).
+def _run(
+    run: PlanetaryRun, progress: Callable[[float], None] | None, mechanism: Mechanism | None = None, **options: Any
+) -> tuple[xr.Dataset, np.ndarray, Behind]:
+    """Return the record of a planetary set, the forces of its meshes, (m, 2 planets), and what was simulated.
 
-    These are at `OVERSAMPLING` times its rate, those with the sun first.
+    Forces are at `OVERSAMPLING` times its rate, those with the sun first.
     """
     from scipy.signal import resample_poly
 
     gears = run.gears
-    mechanism = run.mechanism()
+    mechanism = run.mechanism() if mechanism is None else mechanism
     planets = range(1, gears.planets + 1)
     # mesh forces have corners: what the sensor hears is filtered before it is sampled
-    time, told, apart = _told(run, mechanism, progress)
+    time, told, apart, solution = _told(run, mechanism, progress, **options)
     kept = slice(None, None, OVERSAMPLING)
     both = {"sun": told["sun"], "ring": told["ring"]}
     motion: dict[str, Any] = {}
@@ -294,16 +308,16 @@ def _run(run: PlanetaryRun, progress: Callable[[float], None] | None) -> tuple[x
             **{f"frequency_{name}": value for name, value in rates.items()},
         },
     )
-    return record, at_meshes
+    return record, at_meshes, Behind(mechanism, solution)
 
 
 def _told(
-    run: PlanetaryRun, mechanism: Mechanism, progress: Callable[[float], None] | None
-) -> tuple[np.ndarray, dict[str, np.ndarray], float]:
+    run: PlanetaryRun, mechanism: Mechanism, progress: Callable[[float], None] | None, **options: Any
+) -> tuple[np.ndarray, dict[str, np.ndarray], float, Solution]:
     """Simulate a set; return times of the record, `OVERSAMPLING` at its rate, and what it is made from there.
 
     The third is the part of the time behind the run-up in which the flanks of a mesh were apart, with a rim that bends
-    of that of the record: the largest of all meshes.
+    of that of the record: the largest of all meshes. The last is how the run ended.
 
     Mesh forces and motions are those of the integrator's own steps, between which they are interpolated; a rim that
     bends has to be evaluated, which is done at these times alone.
@@ -316,7 +330,7 @@ def _told(
     fine, begin = run.rate * OVERSAMPLING, run.run_up + run.settling
     first, last = _samples(run)
     recorder = _Recorder(run, mechanism, first / fine - AHEAD / fine)
-    options: dict[str, Any] = {"tol": run.used_tolerance}
+    options = {"tol": run.used_tolerance, **options}
     if run.rim is None:
         options |= {"every_step": True, "consumer": recorder.take, "watch": _watched(run)}
     else:
@@ -328,14 +342,14 @@ def _told(
         raise RuntimeError(f"{run.gears.name}: {solution.message}")
     if run.rim is None:
         time = np.arange(first, last + 1) / fine
-        return time, recorder.at(time), recorder.apart
+        return time, recorder.at(time), recorder.apart, solution
     before = _rows_before(run, solution.t[:first])
     # all bodies and forces at all outputs would need far more memory than what is wanted of them
     for part in solution.parts(np.concatenate([before, np.arange(first, last + 1)])):
         recorder.take(part)
     told = {name: values[before.size :] for name, values in recorder.joined().items()}
     time = solution.t[first : last + 1]
-    return time, told, time_apart(time, np.concatenate([told["sun"], told["ring"]], axis=1))
+    return time, told, time_apart(time, np.concatenate([told["sun"], told["ring"]], axis=1)), solution
 
 
 def _samples(run: PlanetaryRun) -> tuple[int, int]:

@@ -32,8 +32,9 @@ from gearmbs.studies.case.tooth_faults import tooth_fault
 from gearmbs.studies.presets.files import FOLDER, PRESETS
 from gearmbs.studies.run.accuracy import asked_accuracy
 from gearmbs.studies.run.parallel import run_named
+from gearmbs.studies.run.refined import LEFT_TO_TWIN, Behind, keeping
 from gearmbs.studies.run.simulation import SimulationFailed, SimulationInterrupted
-from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines, time_apart
+from gearmbs.studies.train_accuracy import SMALLEST, Lines, Precise, accurate_lines, time_apart
 from gearmbs.studies.train_bearings import bearing_remarks, equivalent_loads
 from gearmbs.studies.train_levels import bearing_names, harmonic_levels, mesh_tracks, signal_names
 from gearmbs.studies.train_record import (
@@ -134,7 +135,8 @@ def run_train(
     if accuracy is not None:
         return _accurate(train, run, mechanism, progress, accuracy)
     check_record(train, run)
-    known, solution = _simulated(train, run, mechanism, progress)
+    known, made = _simulated(train, run, mechanism, progress)
+    solution = made.solution
     return evaluated(train, run, known, solution)
 
 
@@ -146,7 +148,7 @@ def _accurate(
     accuracy: QuantityLike,
 ) -> xr.Dataset:
     """Return a record whose mesh harmonics are as accurate as asked; see `run_train`."""
-    wanted = asked_accuracy(accuracy)
+    wanted = asked_accuracy(accuracy, smallest=SMALLEST)
     title = f"drivetrain '{train.name}'"
     if run.tolerance != RunSettings().tolerance:
         raise DrivetrainError(
@@ -173,14 +175,22 @@ def _accurate(
             "for they are not changed here; take wheels whose flanks do not vary along the face, or compare two numbers"
         )
 
+    behind: Behind | None = None
+
     def lines(precise: Precise) -> Lines:
+        nonlocal behind
         one = train
         for name, count in precise.slices.items():
             if count != slices[name]:
                 one = one.changed(name, settings={"slices": count})
         duration = 0.5 * run.duration if precise.half else run.duration
         settings = replace(run, tolerance=precise.tolerance, duration=duration)
-        known, solution = _simulated(one, settings, mechanism, progress)
+        if precise.half:
+            start = {} if behind is None else behind.start(precise.slices)
+        else:
+            start = keeping(run.integrator, train.run_up + LEFT_TO_TWIN * run.settling)
+        known, made = _simulated(one, settings, start.pop("mechanism", mechanism), progress, **start)
+        behind, solution = replace(made, slices=precise.slices), made.solution
         record = _even_record(one, settings, known) if precise.half else evaluated(one, settings, known, solution)
         # the drivetrain as it was asked for: slices are those of its accuracy, and told beside it
         record.attrs["train_json"] = _described(train)
@@ -217,8 +227,9 @@ def _simulated(
     run: RunSettings,
     mechanism: Mechanism | None,
     progress: bool | Callable[[float], None] | None,
-) -> tuple[TrainColumns, Solution]:
-    """Return what was measured of a drivetrain at the integrator's own steps."""
+    **options: Any,
+) -> tuple[TrainColumns, Behind]:
+    """Return what was measured of a drivetrain at the integrator's own steps, and of what."""
     rate = run.output_rate(train)
     begin = train.run_up + run.settling
     ahead = (MARGIN + 4) / rate
@@ -231,13 +242,13 @@ def _simulated(
     end = np.ceil((begin + run.duration + ahead) * rate) / rate
     solution = simulate(
         m, float(end), every_step=True, consumer=recorder.take, integrator=run.integrator, tol=run.tolerance,
-        rate_scale=train.rate_scale, progress=progress,
+        rate_scale=train.rate_scale, progress=progress, **options,
     )  # fmt: skip
     if not solution.success:
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
         partial = None if recorder.is_empty else raw_record(train, recorder.joined(), solution)
         raise kind(f"drivetrain '{train.name}': {solution.message}", solution, None, partial)
-    return recorder.joined(), solution
+    return recorder.joined(), Behind(m, solution)
 
 
 def run_trains(

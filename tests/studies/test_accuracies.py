@@ -33,9 +33,9 @@ GROUPS = np.zeros(2, dtype=int)
 def test_the_largest_difference_of_a_mesh_counts_for_all_its_harmonics():
     errors = errors_of(lines(LEVELS), lines([100.8, 50.0, 10.0, 1.0, 1.0, 1.0]), GROUPS, 0.5)
     np.testing.assert_allclose(errors.whole[0, 0], 0.4)
-    # one signal is a hundredth of the other: it is judged as if it had that, and 1e-4 is told at least
+    # one signal is a hundredth of the other: it is judged as if it had that, and 2e-4 is told at least
     np.testing.assert_allclose(errors.largest[:, 0, 0], [100.0, 1.0])
-    np.testing.assert_allclose(errors.whole[1, 0], 1e-4)
+    np.testing.assert_allclose(errors.whole[1, 0], 2e-4)
     assert not errors.drift.any()
 
 

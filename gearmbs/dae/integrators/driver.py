@@ -36,7 +36,7 @@ from gearmbs.dae.linalg.left_out import converges_without, signs_of_error
 from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse, lines_for, parity
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import EPS, DAEProblem
-from gearmbs.dae.result import DAEResult, SolverStats, Status
+from gearmbs.dae.result import DAEResult, Kept, SolverStats, Status
 from gearmbs.kernels.bound import trying
 from gearmbs.kernels.pointers import address, bind, direct, no_events, no_hook
 
@@ -82,6 +82,8 @@ class Run:
         """First step that the present pivots were chosen for, zero for none."""
         self.counted = np.zeros(len(problem.indices), dtype=bool)
         self.started = False
+        self.kept: Kept | None = None
+        self.next_pause = np.inf if options.pause is None else -np.inf
         self.start_note = problem.start_note
         self.steps_given = options.first_step is not None, options.min_step is not None
         outputs, end = output_times(t_eval, float(problem.t0), t_end)
@@ -216,6 +218,7 @@ class Run:
         self.records.drain()
         self.records.consumed_time = 0.0
         result = self.records.result(status, message, self._stats())
+        result.kept = self.kept
         if status in (Status.INTERRUPTED, Status.TOO_MANY_STEPS):
             result.checkpoint = self
         return result
@@ -265,14 +268,20 @@ class Run:
         return failure
 
     def _goes_on(self) -> bool:
-        """Return whether the run is to go on beyond a pause, and until when."""
-        if self.options.pause is None:
+        """Return whether the run is to go on beyond a pause; keep the state where that was asked for."""
+        st, options = self.state, self.options
+        if options.pause is None and options.keep_at == np.inf:
             return False
-        self.records.drain()
-        next_pause = self.options.pause(self.state.t)
-        if next_pause is not None:
-            self.state.t_pause = next_pause
-        return next_pause is not None
+        if self.kept is None and st.t >= options.keep_at:
+            self.kept = Kept(st.t, st.y.copy(), st.yp.copy(), st.idata.copy(), st.rdata.copy())
+        if options.pause is not None and st.t >= self.next_pause:
+            self.records.drain()
+            next_pause = options.pause(st.t)
+            if next_pause is None:
+                return False
+            self.next_pause = next_pause
+        st.t_pause = self.next_pause if self.kept is not None else min(self.next_pause, options.keep_at)
+        return True
 
     def _stalled(self) -> tuple[Status, str] | None:
         """Return how the run has ended if it gets nowhere."""

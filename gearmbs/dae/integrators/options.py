@@ -94,6 +94,9 @@ class Options:
     pause : callable, optional
         With a consumer: called as ``pause(t)`` at the start, and when the consumer has all steps up to the time that it
         returned last; with None the run ends there, as at its end. Steps do not depend on it.
+    keep_at : float
+        With a consumer: time, s; the result holds the state at the end of the first step there or later, from which
+        another run can start, as ``result.kept``. Default: none is kept. Steps do not depend on it.
     errors : list of BaseException, optional
         Where callbacks in Python leave the exceptions they raise.
     history : History, optional
@@ -128,6 +131,7 @@ class Options:
     progress: Callable[[float], None] | None = None
     consumer: Consumer | None = None
     pause: Pause | None = None
+    keep_at: float = math.inf
     errors: list[BaseException] | None = None
     history: History | None = None
 
@@ -255,6 +259,7 @@ class StepKeywords(TypedDict, total=False):
     check_start: bool
     repairs: float
     pause: Pause | None
+    keep_at: float
 
 
 class OptionKeywords(StepKeywords, total=False):

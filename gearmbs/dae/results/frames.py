@@ -127,7 +127,10 @@ class Computed(Protocol):
 
 def state_at(solution: Computed, t: float) -> State:
     """Return the state at a time; see `Solution.state_at`."""
-    result, problem = solution.result, solution.problem
+    result, problem, kept = solution.result, solution.problem, solution.result.kept
+    if kept is not None and kept.t == t:
+        tables = kept.idata, kept.rdata
+        return State.of(problem, t, kept.y, kept.yp, tables, origin=solution.initial, given=solution.given)
     row = int(np.searchsorted(result.t, t))
     at_output = row < len(result.t) and result.t[row] == t
     if at_output and len(result.yp):

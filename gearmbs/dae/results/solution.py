@@ -533,7 +533,7 @@ class Solution(Measured, Shown):
         Parameters
         ----------
         t : float
-            An output time, or with ``dense_output`` any time of the run.
+            An output time, with ``dense_output`` any time of the run, or that of ``result.kept``.
 
         Raises
         ------

@@ -63,6 +63,7 @@ class RunOptions(IntegratorOptions, total=False):
     stops: Sequence[StopAt]
     continued: bool
     initial: State | None
+    assembled: Solution | None
     inputs: Mapping[str, Any] | None
 
 

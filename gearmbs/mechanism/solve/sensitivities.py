@@ -47,7 +47,7 @@ WIDENINGS, FARTHEST = 4, 1e6
 """How often, and by how much at a time, models are made farther apart."""
 LARGEST_COUNT = 2**32
 """Above it integers of the tables are addresses; counts and places stay far below."""
-WITHOUT = ("every_step", "consumer", "watch", "stops", "initial", "inputs", "continued", "dense_output")
+WITHOUT = ("every_step", "consumer", "watch", "stops", "initial", "assembled", "inputs", "continued", "dense_output")
 """Options of `simulate` that belong to runs of another kind."""
 
 

@@ -169,6 +169,7 @@ def simulate(
     stops: Sequence[StopAt] = (),
     continued: bool = False,
     initial: State | None = None,
+    assembled: Solution | None = None,
     inputs: Mapping[str, Any] | None = None,
     **options: Unpack[IntegratorOptions],
 ) -> Solution:
@@ -229,6 +230,9 @@ def simulate(
     initial : State, optional
         Start from a state of this mechanism, at its time; see `Solution.state_at` and `gearmbs.Simulator`. With the
         history of the same integrator the run goes on as if it had never stopped, otherwise it starts afresh.
+    assembled : Solution, optional
+        Of an earlier run of the same, unchanged mechanism with the same ``formulation``, ``rate_scale`` and ``lump``:
+        its equations are taken instead of assembled again, which takes as long as some thousand steps.
     inputs : mapping, optional
         Of names of inputs and parameters: a value, ``(times, values)`` that hold from each time on, ``(times, values,
         1)`` for straight lines between them, or ``(function, sample_time)`` for a function of t that is asked at its
@@ -273,11 +277,14 @@ def simulate(
     # its kernels are loaded before the first one is called, so that all that lack are compiled in one round
     INTEGRATORS[name].load()
     # 2. the equations, and where they start and end
-    asked, lump = bool(lump), mechanism.lump and not stops if lump is None else lump
+    asked, lump = bool(lump) or assembled is not None, mechanism.lump and not stops if lump is None else lump
     t_model = t_start if initial is None else initial.t_model
-    system, problem, members, lumping = prepared(
-        mechanism, t_model, lump, formulation, rate_scale, continued or initial is not None
-    )
+    if assembled is None:
+        system, problem, members, lumping = prepared(
+            mechanism, t_model, lump, formulation, rate_scale, continued or initial is not None
+        )
+    else:
+        system, problem, members, lumping = _taken_over(assembled, t_model)
     if initial is not None:
         # events in what is left of the last step would be missed
         problem = _from_state(
@@ -322,6 +329,16 @@ def simulate(
     warn_of_spin(mechanism.bodies, solution)
     warn_of_lost_torques(mechanism.elements, solution)
     return solution
+
+
+def _taken_over(run: Solution, t_model: float) -> tuple[System, DAEProblem, Members | None, str]:
+    """Return what `_prepared` has returned for an earlier run, which began as it was assembled."""
+    if run.initial is not None or run.problem.t0 != t_model:
+        raise ModelError(
+            f"assembled: its run starts at {run.problem.t0:g} s{' in a state' if run.initial is not None else ''}, the "
+            f"model is one for {t_model:g} s; give a run from the time at which this one, or its state's, started"
+        )
+    return run.system, run.problem, run.members, run.remark
 
 
 def _from_state(
@@ -522,5 +539,6 @@ SETTINGS = (
     "stops",
     "continued",
     "initial",
+    "assembled",
     "inputs",
 )

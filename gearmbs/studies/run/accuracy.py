@@ -26,11 +26,12 @@ import numpy as np
 from gearmbs.dae.methods import INTEGRATORS
 from gearmbs.schema.quantities import accuracy_part
 from gearmbs.studies.case.case import Case, CaseError, CaseWarning
+from gearmbs.studies.case.limits import check_record, holds_period
 from gearmbs.studies.case.sections import LEAST_TOLERANCE
 from gearmbs.studies.run.levels import LEVELS
 from gearmbs.studies.run.periodic import HOLDS, LEAST_LEVEL, Found, Precision
-from gearmbs.studies.run.record import SERIES, VARIABLES
-from gearmbs.studies.run.refined import COARSER, Made, refined
+from gearmbs.studies.run.record import SERIES, VARIABLES, PlainRecord, dims_of, told_of, values_of
+from gearmbs.studies.run.refined import COARSER, Behind, Made, refined
 from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
@@ -69,16 +70,29 @@ NOTED = 0.3
 
 
 class Recorded(NamedTuple):
-    """A record, and which mesh periods of its run it is of, if its duration is "auto"."""
+    """A record, and what it takes to judge it by that of a twin.
 
-    record: xr.Dataset
-    found: Found | None
+    Attributes
+    ----------
+    record : PlainRecord or Dataset
+    found : Found or None
+        Mesh periods that the record of a twin is of; None unless the duration is "auto".
+    levels : ndarray or None
+        RMS of the mesh harmonics over the part of the record that a twin shares; default those of all of it.
+    behind : Behind or None
+        What was simulated, with a state behind the run-up for a twin to start from.
+    """
+
+    record: PlainRecord | xr.Dataset
+    found: Found | None = None
+    levels: np.ndarray | None = None
+    behind: Behind | None = None
 
 
 class _Judged(NamedTuple):
     """Numerical errors of levels, the part of a difference that they are at least, and the largest as a part."""
 
-    error: xr.DataArray
+    error: np.ndarray
     share: float
     worst: float
 
@@ -90,12 +104,12 @@ class _Judged(NamedTuple):
 class Run(Protocol):
     """Simulates a case, for some variables, to a precision."""
 
-    def __call__(
-        self, case: Case, variables: Collection[str] | None, precision: Precision | None = None
-    ) -> Recorded: ...
+    def __call__(self, case: Case, variables: Collection[str] | None, precision: Precision) -> Recorded: ...
 
 
-def asked_accuracy(accuracy: QuantityLike, of: str = "the largest mesh harmonic of a component") -> float:
+def asked_accuracy(
+    accuracy: QuantityLike, of: str = "the largest mesh harmonic of a component", smallest: float = SMALLEST
+) -> float:
     """Return an accuracy as a part; see `gearmbs.schema.quantities.accuracy_part`.
 
     Raises
@@ -104,7 +118,7 @@ def asked_accuracy(accuracy: QuantityLike, of: str = "the largest mesh harmonic 
         If it is none, or beyond what can be asked for.
     """
     try:
-        return accuracy_part(accuracy, of, SMALLEST)
+        return accuracy_part(accuracy, of, smallest)
     except ValueError as error:
         raise CaseError(str(error)) from None
 
@@ -191,8 +205,8 @@ def accurate_record(
 
     def judge(fine: Made[Case, Recorded], twin: Made[Case, Recorded]) -> _Judged:
         share = _share(fine.settings, twin.settings)
-        error = _errors(fine.result.record, twin.result.record, level, share)
-        return _Judged(error, share, _worst(fine.result.record[level], error))
+        error, worst = _errors(fine.result, twin.result, level, share)
+        return _Judged(error, share, worst)
 
     def finer(fine: Case, part: float) -> Case:
         count = fine.pair().face_slices
@@ -202,7 +216,7 @@ def accurate_record(
     done = refined(
         first, lambda one: run(one, kept | {level}, precision), twin_of, judge, finer, wanted, LEAST_TOLERANCE
     )
-    record, twin, fine, coarse = (
+    made, twin, fine, coarse = (
         done.fine.result.record,
         done.twin.result.record,
         done.fine.settings,
@@ -210,9 +224,11 @@ def accurate_record(
     )
     error, share, worst = done.judged.error, done.judged.share, done.judged.worst
     if level in kept:
-        record[f"{level}_error"] = error
-    for name in kept & {*SERIES} & {*record.data_vars} & {*twin.data_vars}:
-        _add_errors(record[name], twin[name], share, worst)
+        _add_level_errors(made, level, error)
+    record = made.dataset() if isinstance(made, PlainRecord) else made
+    for name in kept & {*SERIES} & {*record.data_vars}:
+        if name in twin:
+            _add_errors(record[name], values_of(twin, name), share, worst)
     if level not in kept:
         record = record.drop_vars(level)
         left = {dim for one in record.data_vars.values() for dim in one.dims}
@@ -234,7 +250,24 @@ def _twin(run: Run, fine: Case, found: Recorded, variables: Collection[str]) -> 
     slices = fine.pair().face_slices
     largest = INTEGRATORS[fine.solver.integrator].largest_tolerance
     coarse = _at(fine, min(COARSER * fine.tolerance, largest), max(FEWEST_SLICES - 1, slices // 2) if slices > 1 else 1)
-    return Made(coarse, run(coarse, variables, Precision(like=found.found)))
+    if not fine.is_auto and found.levels is not None:
+        coarse = part_of(coarse) or coarse
+    return Made(coarse, run(coarse, variables, Precision(like=found.found, behind=found.behind, is_twin=True)))
+
+
+def part_of(case: Case) -> Case | None:
+    """Return a case whose record is the part that run and twin are held against each other over; None for all of it.
+
+    It is the first half, if that can be evaluated and no fault of a tooth is left out of it.
+    """
+    if case.operation.speed_curve is not None or case.is_auto:
+        return None
+    half = case.changed(operation={"duration": 0.5 * case.operation.longest})
+    try:
+        check_record(half)
+    except CaseError:
+        return None
+    return half if holds_period(half) else None
 
 
 def _share(fine: Case, coarse: Case) -> float:
@@ -243,14 +276,27 @@ def _share(fine: Case, coarse: Case) -> float:
     return max(SHARE, ratio**2 / (1.0 - ratio**2)) if ratio < 1.0 else SHARE
 
 
-def _add_errors(series: xr.DataArray, other: xr.DataArray, share: float, worst: float) -> None:
+def _add_level_errors(made: PlainRecord | xr.Dataset, level: str, error: np.ndarray) -> None:
+    """Add the errors of levels to a record."""
+    values = made.data[level] if isinstance(made, PlainRecord) else made[level]
+    told = values[2] if isinstance(values, tuple) else values.attrs
+    attributes = {"units": told["units"], "long_name": f"numerical error of the {told['long_name']}"}
+    variable = dims_of(made, level), error, attributes
+    if isinstance(made, PlainRecord):
+        made.data[f"{level}_error"] = variable
+    else:
+        made[f"{level}_error"] = variable
+
+
+def _add_errors(series: xr.DataArray, other: np.ndarray, share: float, worst: float) -> None:
     """Add the errors of its mean and standard deviation to a variable over time.
 
-    They are single differences, which may be small by chance: of the larger one, and what the harmonics are off by as
-    parts, of the standard deviation.
+    They are single differences over what the twin has of it, which may be small by chance: of the larger one, and what
+    the harmonics are off by as parts, of the standard deviation.
     """
-    one, two = (v.astype(float).values.reshape(v.sizes["time"], -1) for v in (series, other))
-    apart = np.maximum(np.abs(one.mean(axis=0) - two.mean(axis=0)), np.abs(one.std(axis=0) - two.std(axis=0)))
+    one, two = (v.astype(float).reshape(len(v), -1) for v in (series.values, other))
+    part = one[: len(two)]
+    apart = np.maximum(np.abs(part.mean(axis=0) - two.mean(axis=0)), np.abs(part.std(axis=0) - two.std(axis=0)))
     error = (share * apart + worst * one.std(axis=0)).squeeze()
     for what in ("mean", "std"):
         series.attrs[f"error_of_{what}"] = error.tolist()
@@ -262,29 +308,32 @@ def _at(case: Case, tolerance: float, slices: int) -> Case:
     return case.changed(solver={"tolerance": tolerance, "lump": case.lump}, contact=contact)
 
 
-def _errors(record: xr.Dataset, twin: xr.Dataset, level: str, share: float) -> xr.DataArray:
-    """Return the numerical errors of the levels of a record from those of its twin."""
-    import xarray as xr
+def _errors(made: Recorded, twin: Recorded, level: str, share: float) -> tuple[np.ndarray, float]:
+    """Return the numerical errors of the levels of a record from those of its twin, and the largest as a part.
 
-    values = record[level]
-    apart, largest = abs(values - twin[level]).max("harmonic"), values.max("harmonic")
-    error = xr.where(apart > APART * largest, 1.0, share) * apart
+    That is of the largest level of the component, or of a hundredth of that of all.
+    """
+    record, told = made.record, told_of(made.record)
+    values, dims = values_of(record, level), dims_of(record, level)
+    along, across = dims.index("harmonic"), dims.index("component")
+    one, two = (values_of(run.record, level) if run.levels is None else run.levels for run in (made, twin))
+    apart = np.fmax.reduce(np.abs(one - two), axis=along, keepdims=True)
+    if "way" in dims:
+        # half of a record may be too short for bands
+        apart = np.where(np.isnan(apart), np.fmax.reduce(apart, axis=dims.index("way"), keepdims=True), apart)
+    largest = np.fmax.reduce(values, axis=along, keepdims=True)
+    error = np.where(apart > APART * largest, 1.0, share) * apart
     error = np.maximum(error, FLOOR * largest) + 0.0 * values
-    if record.attrs.get("record_status") == "periodic":
-        returned = record.attrs["record_deviation"] * np.maximum(values, LEAST_LEVEL * largest)
+    if told.get("record_status") == "periodic":
+        returned = told["record_deviation"] * np.maximum(values, LEAST_LEVEL * largest)
         error = np.hypot(error, DECAYED * returned)
-    elif "record_status" in record.attrs:
+    elif "record_status" in told:
         # of what does not repeat itself two stretches are two samples, of which neither is the better one
         error = np.maximum(error, apart)
-    error = error.transpose(*values.dims)
-    error.attrs = {"units": values.attrs["units"], "long_name": f"numerical error of the {values.attrs['long_name']}"}
-    return error
-
-
-def _worst(levels: xr.DataArray, error: xr.DataArray) -> float:
-    """Return the largest error as a part of the largest level of its component, or a hundredth of that of all."""
-    largest = levels.max([dim for dim in levels.dims if dim not in ("way", "component")])
-    return float((error / np.maximum(largest, LEAST_LEVEL * largest.max("component"))).max())
+    others = tuple(k for k, dim in enumerate(dims) if dim not in ("way", "component"))
+    largest = np.fmax.reduce(values, axis=others, keepdims=True)
+    of = np.maximum(largest, LEAST_LEVEL * np.fmax.reduce(largest, axis=across, keepdims=True))
+    return error, float(np.nanmax(error / of))
 
 
 def _told(record: xr.Dataset, wanted: float, worst: float, fine: Case, coarse: Case) -> xr.Dataset:

@@ -34,6 +34,7 @@ from gearmbs.studies.case.case import Case
 from gearmbs.studies.case.limits import HARMONICS, geometric_period
 from gearmbs.studies.run.levels import bands_of_lines
 from gearmbs.studies.run.recorder import COUNTS, SMOOTH, Measured, Recorder, Span, to_mesh
+from gearmbs.studies.run.refined import Behind
 
 SAMPLES = 1024
 """Samples of a mesh period, ten of a contact that lasts a hundredth of it; means over each lower the first harmonics by
@@ -96,10 +97,16 @@ class Precision(NamedTuple):
         Deviation up to which a motion is said to repeat itself.
     like : Found or None
         The record is to be this one of another run of the motion, whether the motion repeats itself or not.
+    behind : Behind or None
+        Another run of the motion, to start from a state of it behind the run-up; default rest.
+    is_twin : bool
+        Whether the record is that part of another run's by which the two are held against each other.
     """
 
     holds: float = HOLDS
     like: Found | None = None
+    behind: Behind | None = None
+    is_twin: bool = False
 
 
 class PeriodicRecorder:
@@ -148,6 +155,11 @@ class PeriodicRecorder:
     def repeat(self, period: Solution, copies: Sequence[tuple[np.ndarray, float]]) -> None:
         """Take a period of a motion that is known to repeat itself; see `Recorder.repeat`."""
         self.recorder.repeat(period, copies)
+
+    @property
+    def settled(self) -> float:
+        """Time, s, from which the run of a twin may start: it settles within the mesh periods that are left to it."""
+        return self._begin + (OVERLAP / self._gmf if self.period > 1 else 0.0)
 
     def pause(self, t: float) -> float | None:
         """Return when to look at the motion again, or None if it repeats itself; see `gearmbs.dae.Options`."""
@@ -274,13 +286,27 @@ class PeriodicRecorder:
         contact |= {name: np.concatenate([known.contact[name][inside]] * copies.size) for name in COUNTS}
         return Measured((t + length * copies[:, None]).ravel(), repeated(known.forces), repeated(known.error), contact)
 
-    def levels(self) -> np.ndarray:
+    @property
+    def part(self) -> Found:
+        """The part of the record by which another run is held against it: half, but all periods of faulty teeth."""
+        assert self.found is not None
+        if self._precision.is_twin:
+            return self.found
+        return Found(self.found.start, max(self.period, self.found.periods // 2))
+
+    def levels(self, part: Found | None = None) -> np.ndarray:
         """Return the RMS of the mesh harmonics' acceleration, shape (2, harmonics, components): by band and by orders.
 
         The band-passes of other records let through, of the lines of this one, what they would of a long repetition.
+
+        Parameters
+        ----------
+        part : Found, optional
+            Mesh periods of the record; default all.
         """
-        assert self.found is not None
-        first, periods = self.found
+        found = part or self.found
+        assert found is not None
+        first, periods = found
         last = first + periods
         if last <= len(self._samples):
             values = self._samples[first:last].reshape(-1, len(COMPONENTS))

@@ -100,6 +100,12 @@ def values_of(record: PlainRecord | xr.Dataset, name: str) -> np.ndarray:
     return record.values(name) if isinstance(record, PlainRecord) else record[name].values
 
 
+def dims_of(record: PlainRecord | xr.Dataset, name: str) -> tuple[str, ...]:
+    """Return the dimensions of a variable of a record."""
+    found = record.data[name] if isinstance(record, PlainRecord) else record[name]
+    return tuple(found[0] if isinstance(found, tuple) else map(str, found.dims))
+
+
 def told_of(record: PlainRecord | xr.Dataset) -> Mapping[Any, Any]:
     """Return what a run says of its record; of a dataset all attributes."""
     return record.told if isinstance(record, PlainRecord) else record.attrs

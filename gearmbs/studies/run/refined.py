@@ -8,9 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
+
+from gearmbs.dae.methods import INTEGRATORS
+
+if TYPE_CHECKING:
+    from gearmbs.dae.results.solution import Solution
+    from gearmbs.mechanism import Mechanism
 
 COARSER = 10.0
 """Tolerance of the twin over that of the run: a decade."""
@@ -20,6 +26,10 @@ ATTEMPTS = 3
 
 AIMED = 0.5
 """Part of what is asked that the next run aims at, and that errors may have which a finer run mends if others stay."""
+
+LEFT_TO_TWIN = 0.25
+"""Part of the settling of a train or a set behind which its twin starts: what a flywheel behind a soft clutch does
+otherwise in the twin takes as long to come about as what it does behind a run-up to die out."""
 
 LEAST_PART = 1e-3
 """Of its tolerance, to which a run is made finer at once."""
@@ -61,6 +71,39 @@ class Made(Generic[P, R]):
 
     settings: P
     result: R
+
+
+@dataclass(frozen=True)
+class Behind:
+    """A run that its twin starts from where it has settled: both go on along one motion, each to its own accuracy.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    solution : Solution
+        With a state that was kept, if its integrator keeps any.
+    slices : object
+        Of the faces: what is equal for equal ones.
+    """
+
+    mechanism: Mechanism
+    solution: Solution
+    slices: Any = None
+
+    def start(self, slices: Any = None) -> dict[str, Any]:
+        """Return the keywords by which a twin with some slices of the faces is simulated; none if it begins at rest."""
+        kept = self.solution.result.kept
+        if kept is None:
+            return {}
+        state = self.solution.state_at(kept.t)
+        if slices == self.slices:
+            return {"mechanism": self.mechanism, "initial": state, "assembled": self.solution}
+        return {"initial": state}
+
+
+def keeping(integrator: str, time: float) -> dict[str, Any]:
+    """Return the keywords by which a run keeps its state at a time, s, for a `Behind`, if its integrator does."""
+    return {"keep_at": time} if INTEGRATORS[integrator].can("keep_at") else {}
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from gearmbs.studies.case.case import Case, CaseError
 from gearmbs.studies.case.limits import check_record
 from gearmbs.studies.case.sections import Operation, Solver
 from gearmbs.studies.run import rig
-from gearmbs.studies.run.accuracy import Recorded, accurate_record
+from gearmbs.studies.run.accuracy import Recorded, accurate_record, part_of
 from gearmbs.studies.run.periodic import Found, PeriodicRecorder, Precision, reach, signal_stop
 from gearmbs.studies.run.record import (
     VARIABLES,
@@ -33,7 +33,17 @@ from gearmbs.studies.run.record import (
     time_series,
     title_of,
 )
-from gearmbs.studies.run.recorder import WATCHED, Measured, Recorder, Separations, measure, rows_of_record, slip
+from gearmbs.studies.run.recorder import (
+    WATCHED,
+    Measured,
+    Recorder,
+    Separations,
+    measure,
+    rows_of_record,
+    slip,
+    span_of,
+)
+from gearmbs.studies.run.refined import Behind, keeping
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -304,9 +314,8 @@ def run_case(
     if accuracy is None:
         return plain_record(case, progress, mechanism=mechanism, variables=variables).dataset()
 
-    def run(case: Case, variables: Collection[str] | None, precision: Precision | None = None) -> Recorded:
-        plain, found = _recorded(case, progress, mechanism, variables, precision)
-        return Recorded(plain.dataset(), found)
+    def run(case: Case, variables: Collection[str] | None, precision: Precision) -> Recorded:
+        return _recorded(case, progress, mechanism, variables, precision)
 
     _check(case, variables)
     return accurate_record(run, case, accuracy, variables, mechanism)
@@ -331,7 +340,9 @@ def plain_record(
     ((2, 3, 4), ['band', 'orders'])
     """
     _check(case, variables)
-    return _recorded(case, progress, mechanism, variables, None)[0]
+    record = _recorded(case, progress, mechanism, variables, None).record
+    assert isinstance(record, PlainRecord)
+    return record
 
 
 def _check(case: Case, variables: Collection[str] | None) -> None:
@@ -348,13 +359,18 @@ def _recorded(
     mechanism: Mechanism | None,
     variables: Collection[str] | None,
     precision: Precision | None,
-) -> tuple[PlainRecord, Found | None]:
-    """Simulate a case that has been checked; return its record and which mesh periods it is of, see `Recorded`."""
+) -> Recorded:
+    """Simulate a case that has been checked; with a ``precision`` what it takes to judge the record comes with it."""
     load_kernels(case.solver.integrator, case.lump)
     # what rolls in bearings does not come back with the teeth
     known_period = mechanism is None and case.shafts.bearings is None
+    behind = None if precision is None else precision.behind
+    start = {} if behind is None else behind.start(case.pair().face_slices)
+    simulated = start.pop("mechanism", mechanism)
+    if simulated is None:
+        simulated = case_mechanism(case)
     if mechanism is None and case.shafts.are_parts:
-        mechanism = case_mechanism(case)
+        mechanism = simulated
     periodic = PeriodicRecorder(case, known_period, precision=precision) if case.is_auto else None
     recorder = Recorder(case) if periodic is None else periodic.recorder
     apart = Separations(case) if precision is not None and periodic is None else None
@@ -365,20 +381,29 @@ def _recorded(
             apart.take(part)
 
     take = recorder.take if apart is None else take_both
-    options: dict[str, Any] = {"every_step": True, "consumer": take, "watch": WATCHED}
+    options: dict[str, Any] = {"every_step": True, "consumer": take, "watch": WATCHED, **start}
     if periodic is not None and INTEGRATORS[case.solver.integrator].can("pause"):
         options["pause"] = periodic.pause
-    solution = simulate_case(case, progress, mechanism=mechanism, **options)
+    if precision is not None and not precision.is_twin:
+        # teeth damp what a twin does otherwise in some mesh periods
+        settled = case.operation.run_up + 0.5 * case.operation.settling if periodic is None else periodic.settled
+        options |= keeping(case.solver.integrator, settled)
+    solution = simulate_case(case, progress, mechanism=simulated, **options)
     if not solution.success:
         kind = SimulationInterrupted if solution.status is Status.INTERRUPTED else SimulationFailed
         known = _partial(case, solution, recorder, mechanism)
         raise kind(f"case '{case.name}': {solution.message}", solution, case, known)
+    levels = None
     try:
         if periodic is None or periodic.found is None:
             measured, even = recorder.measured(), recorder.is_even
             plain = _evaluated(case, solution, measured, recorder.slipped, even=even, variables=variables)
+            part = part_of(case) if even and precision is not None and not precision.is_twin else None
+            if part is not None:
+                levels = _levels_of_part(part, solution, measured)
         else:
             plain = evaluated_period(case, solution, periodic, variables)
+            levels = periodic.levels(periodic.part) if precision is not None else None
     except SimulationFailed as failure:
         known = _partial(case, solution, recorder, mechanism)
         raise SimulationFailed(str(failure), solution, case, known) from None
@@ -387,7 +412,16 @@ def _recorded(
         plain.told |= periodic.attributes()
     if apart is not None:
         plain.told["record_apart"] = apart.share
-    return plain, None if periodic is None else periodic.found or Found(0, 0)
+    found = None if periodic is None else periodic.part if periodic.found else Found(0, 0)
+    return Recorded(plain, found, levels, Behind(simulated, solution, case.pair().face_slices))
+
+
+def _levels_of_part(part: Case, solution: Solution, known: Measured) -> np.ndarray:
+    """Return the RMS of the mesh harmonics of the first part of what was measured, which is a record of ``part``."""
+    end = int(np.searchsorted(known.t, span_of(part).stop + part.edge + 0.5 / part.output_rate))
+    contact = {name: values[:end] for name, values in known.contact.items()}
+    first = Measured(known.t[:end], known.forces[:end], known.error[:end], contact)
+    return _evaluated(part, solution, first, None, even=True, variables={"gmf_rms"}).values("gmf_rms")
 
 
 def _misplaced(name: str, value: Any) -> str:
