@@ -387,6 +387,39 @@ def test_lengths_of_teeth_that_just_touch():
     assert np.sqrt(np.mean((found - expected) ** 2)) < 1e-3 * np.sqrt(np.mean(expected**2))
 
 
+@pytest.mark.slow
+def test_by_the_pressure_angle_differences_are_met_as_closely_as_steps_are_asked_to_be():
+    """What is left is the steps' own: differences over two sizes agree, and derivatives come up to them."""
+    case = Case(operation={"speed": 104.72, "torque": 100.0, "run_up": 0.01, "settling": 0.0, "duration": 0.01})
+    angle, settings = np.radians(20.0), {"rate": 20_000, "rate_scale": 3000.0, "lump": True}
+
+    def geared(angle):
+        return case_mechanism(case.changed(gears={"pressure_angle": angle}))
+
+    def force(solution):
+        return solution.contact("mesh")["normal_force"]
+
+    def difference(part):
+        above, below = (
+            force(geared(angle * f).simulate(0.02, tol=1e-11, **settings)) for f in (1.0 + part, 1.0 - part)
+        )
+        return (above - below) / (2.0 * part * angle)
+
+    def off(found, expected):
+        return np.linalg.norm(found - expected) / np.linalg.norm(expected)
+
+    expected = difference(1e-5)
+    assert off(difference(1e-4), expected) < 2e-3
+    loose, close = (
+        forward_sensitivities(geared, {"angle": angle}, 0.02, tol=1e-8, local_error=allowed, **settings)
+        for allowed in (None, 1e-4)
+    )
+    told = loose.local_error["angle"]
+    assert 1e-2 < told < 5e-2
+    assert off(loose.derivative("angle", force), expected) < 2.0 * told
+    assert off(close.derivative("angle", force), expected) < 4e-3
+
+
 def test_limits_that_are_infinite_say_nothing_of_a_parameter(recwarn):
     """Friction brings a sliding mass to rest: by its coefficient the way is that of -mu g t^2 / 2; it has no limit."""
 
