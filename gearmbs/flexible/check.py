@@ -13,7 +13,7 @@ import scipy.sparse.linalg as spl
 from gearmbs.flexible.fe_model import FiniteElementModel, MassProperties
 from gearmbs.flexible.interfaces import Interface, Resolved, resolve
 from gearmbs.flexible.modal_model import ModalModel
-from gearmbs.flexible.reduction import GROUNDED, free_modes, static_flexibility
+from gearmbs.flexible.reduction import GROUNDED, HeldBody, free_modes, static_flexibility
 
 MOTIONS = ("x", "y", "z", "rot x", "rot y", "rot z")
 
@@ -262,7 +262,7 @@ def _lost(k, m, parts: Resolved, rigid: np.ndarray, reduced: ModalModel) -> tupl
     forces: dict[str, float] = {}
     torques: dict[str, float] = {}
     stiff = (2 * np.pi * reduced.frequencies) ** 2
-    for key, exact in static_flexibility(k, m, rigid, parts).items():
+    for key, exact in static_flexibility(HeldBody(k, parts.constraints), m, rigid, parts).items():
         seat, own = reduced.seats[key], np.diag(exact)
         for out, three, motion in ((forces, own[:3], seat.moved), (torques, own[3:], seat.turned)):
             there = np.isfinite(three)

@@ -11,10 +11,12 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cached_property
 from numbers import Integral
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
@@ -245,7 +247,8 @@ def reduce_model(
     k = sp.csc_array(parts.expand.T @ model.stiffness @ parts.expand)
     m = sp.csc_array(parts.expand.T @ model.mass @ parts.expand)
     rigid = _rigid_of(model, parts)
-    found_values, vibrating = _vibrations(k, m, rigid, parts, method, modes, limit)
+    held = HeldBody(k, parts.constraints)
+    found_values, vibrating = _vibrations(held, m, rigid, method, modes, limit)
     if modes is not None and found_values.size < modes and limit is None:
         raise FlexibleError(
             f"{model.name}: modes = {modes}, but beside its static shapes the model has {found_values.size}; "
@@ -255,7 +258,7 @@ def reduce_model(
     if method == "free":
         basis = np.hstack([vibrating, attachment_modes(k, m, rigid, parts.constraints)])
     else:
-        static = constraint_modes(k, parts.constraints)
+        static = constraint_modes(held)
         basis = np.hstack([static, vibrating])
     if basis.shape[1] == 0:
         raise FlexibleError(
@@ -272,7 +275,7 @@ def reduce_model(
     if model.slices is not None:
         shapes = _in_planes(model, parts, values, shapes)
     shapes = _signed(parts, shapes)
-    exact = {} if preload is not None else static_flexibility(k, m, rigid, parts, static)
+    exact = {} if preload is not None else static_flexibility(held, m, rigid, parts, static)
     frequencies = np.sqrt(values) / (2 * np.pi)
     found = as_modal_model(model, parts, properties, frequencies, shapes, name or model.name)
     seats = {key: replace(seat, flexibility=exact.get(key)) for key, seat in found.seats.items()}
@@ -300,9 +303,8 @@ def _signed(parts: Resolved, shapes: np.ndarray) -> np.ndarray:
 
 
 def _vibrations(
-    k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, parts: Resolved, method: str, modes: int | None,
-    limit: float | None,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    held: HeldBody, m: sp.csc_array, rigid: np.ndarray, method: str, modes: int | None, limit: float | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return squared circular frequencies and shapes with held interfaces, or of the free body: see `reduce_model`.
 
     The spaces of more modes hold those of fewer, so that by Rayleigh's quotient no frequency of the body gets worse
@@ -311,9 +313,9 @@ def _vibrations(
     count = modes if modes is not None else USUAL
     while True:
         if method == "free":
-            values, shapes = free_modes(k, m, rigid, count + MULTIPLE)
+            values, shapes = free_modes(held.stiffness, m, rigid, count + MULTIPLE)
         else:
-            values, shapes = held_modes(k, m, parts.constraints, count + MULTIPLE)
+            values, shapes = held_modes(held, m, count + MULTIPLE)
         complete = values.size < count + MULTIPLE
         below = values.size if limit is None else int(np.sum(np.sqrt(values) <= 2 * np.pi * limit))
         if modes is not None or limit is None or below < values.size or complete:
@@ -434,18 +436,45 @@ def _rigid_of(model: FiniteElementModel, parts: Resolved) -> np.ndarray:
     return spl.splu(gram).solve(np.asarray(parts.expand.T @ model.rigid_motion()))
 
 
-def held_modes(
-    k: sp.csc_array, m: sp.csc_array, constraints: sp.csr_array, count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return squared circular frequencies and shapes with the constraints held at zero.
+class HeldBody:
+    """A body with stiffness K (r, r) and interfaces C x, (b, r), that are held: factorised once, when it is asked."""
+
+    def __init__(self, stiffness: sp.csc_array, constraints: sp.csr_array) -> None:
+        self.stiffness, self.constraints = stiffness, constraints
+        self.scale = float(np.abs(stiffness.diagonal()).mean()) or 1.0
+
+    @cached_property
+    def _factor(self) -> Any:
+        held = self.scale * self.constraints
+        matrix = sp.block_array([[self.stiffness, held.T], [held, None]], format="csc")
+        try:
+            # of symmetric patterns minimum degree fills less than the default of unsymmetric ones: 0.6 of a housing's
+            return spl.splu(sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A")
+        except RuntimeError:
+            raise FlexibleError(
+                "the stiffness with held interfaces is singular: the interfaces leave the body a rigid motion or an "
+                "unconnected part; add an interface, or use method='free'"
+            ) from None
+
+    def solve(self, loads: npt.ArrayLike, moved: npt.ArrayLike = 0.0) -> np.ndarray:
+        """Return the displacements (r, ...) under loads (r, ...) with the interfaces moved by (b, ...)."""
+        r, b = self.stiffness.shape[0], self.constraints.shape[0]
+        right = np.zeros((r + b, *(np.shape(loads) or np.shape(moved))[1:]))
+        right[:r], right[r:] = loads, self.scale * np.asarray(moved)
+        return self._factor.solve(right)[:r]
+
+
+def held_modes(held: HeldBody, m: sp.csc_array, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return squared circular frequencies and shapes with the interfaces held at zero.
 
     Parameters
     ----------
-    k, m : sparse matrix, shape (r, r)
-    constraints : sparse matrix, shape (b, r)
+    held : HeldBody
+    m : sparse matrix, shape (r, r)
     count : int
         How many, the slowest.
     """
+    k, constraints = held.stiffness, held.constraints
     r, b = k.shape[0], constraints.shape[0]
     if r - b < 1 or count < 1:
         return np.zeros(0), np.zeros((r, 0))
@@ -456,44 +485,18 @@ def held_modes(
         z = scipy.linalg.null_space(constraints.toarray()) if b else np.eye(r)
         values, vectors = scipy.linalg.eigh(z.T @ k @ z, z.T @ m @ z, subset_by_index=[0, count - 1])
         return np.maximum(values, 0.0), z @ vectors
-    # the factor of the saddle matrix applies K^-1 on the space of motions that the constraints allow
-    solve = _saddle(k, constraints)
-    inverse = spl.LinearOperator((r, r), matvec=lambda x: solve(x)[:r], dtype=float)
+    # K^-1 on the space of motions that the constraints allow
+    inverse = spl.LinearOperator((r, r), matvec=held.solve, dtype=float)
     start = np.random.default_rng(0).standard_normal(r)
     values, vectors = spl.eigsh(k, count, m, sigma=0.0, OPinv=inverse, v0=inverse @ (m @ start))
     order = np.argsort(values)
     return np.maximum(values[order], 0.0), vectors[:, order]
 
 
-def constraint_modes(k: sp.csc_array, constraints: sp.csr_array) -> np.ndarray:
+def constraint_modes(held: HeldBody) -> np.ndarray:
     """Return the static shapes in which one interface coordinate is 1 and the others are 0, shape (r, b)."""
-    r, b = k.shape[0], constraints.shape[0]
-    if b == 0:
-        return np.zeros((r, 0))
-    solve = _saddle(k, constraints)
-    right = np.zeros((r + b, b))
-    right[r:] = np.eye(b)
-    return np.column_stack([solve(right[:, c], full=True)[:r] for c in range(b)])
-
-
-def _saddle(k: sp.csc_array, constraints: sp.csr_array):
-    """Return a function that solves [[K, s C'], [s C, 0]] for right-hand sides of K's rows or of all rows."""
-    r, b = k.shape[0], constraints.shape[0]
-    scale = float(np.abs(k.diagonal()).mean()) or 1.0
-    matrix = sp.block_array([[k, scale * constraints.T], [scale * constraints, None]], format="csc")
-    try:
-        factor = spl.splu(sp.csc_matrix(matrix))
-    except RuntimeError:
-        raise FlexibleError(
-            "the stiffness with held interfaces is singular: the interfaces leave the body a rigid motion or an "
-            "unconnected part; add an interface, or use method='free'"
-        ) from None
-
-    def solve(x: np.ndarray, full: bool = False) -> np.ndarray:
-        right = np.concatenate([x[:r], scale * x[r:]]) if full else np.concatenate([x, np.zeros(b)])
-        return factor.solve(right)
-
-    return solve
+    r, b = held.stiffness.shape[0], held.constraints.shape[0]
+    return held.solve(0.0, np.eye(b)) if b else np.zeros((r, 0))
 
 
 def free_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -538,12 +541,11 @@ def attachment_modes(k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, constr
     loads = constraints.T.toarray()
     balanced = loads - inertial @ np.linalg.solve(rigid.T @ inertial, rigid.T @ loads)
     # any solution of the singular system will do: rigid motions are taken out afterwards
-    solve = _saddle(k, sp.csr_array(inertial.T / np.abs(inertial).max()))
-    return np.column_stack([solve(balanced[:, c])[: k.shape[0]] for c in range(b)])
+    return HeldBody(k, sp.csr_array(inertial.T / np.abs(inertial).max())).solve(balanced)
 
 
 def static_flexibility(
-    k: sp.csc_array, m: sp.csc_array, rigid: np.ndarray, parts: Resolved, static: np.ndarray | None = None
+    held: HeldBody, m: sp.csc_array, rigid: np.ndarray, parts: Resolved, static: np.ndarray | None = None
 ) -> dict[str, np.ndarray]:
     """Return how each seat of the free body moves and turns by unit loads there, (6, 6); NaN where it does not.
 
@@ -552,12 +554,11 @@ def static_flexibility(
     """
     if not parts.places:
         return {}
-    inertial = m @ rigid
+    k, inertial = held.stiffness, m @ rigid
     if static is None:
         shapes = attachment_modes(k, m, rigid, parts.constraints)
     else:
-        solve = _saddle(k, parts.constraints)
-        span = np.hstack([static, *(solve(column)[: k.shape[0], None] for column in inertial.T)])
+        span = np.hstack([static, held.solve(inertial)])
         span = span - rigid @ np.linalg.solve(rigid.T @ inertial, inertial.T @ span)
         span /= np.linalg.norm(span, axis=0).clip(min=1e-300)
         loads = parts.constraints @ span

@@ -28,6 +28,18 @@ COUPLING = ("full", "partial", "constant")
 SHAPE_ROUNDING = 1e-12
 """Share of the largest below which shapes at a marker are rounding errors."""
 
+TURN = np.array([np.cross(axis, np.eye(3)).T for axis in np.eye(3)])
+"""Matrices of the cross product with the unit vectors, [m, i, j]: e_m~ v = e_m x v."""
+
+_EARLIER = np.arange(3)[:, None] < np.arange(3)
+_ORDERED = np.where(_EARLIER[:, :, None, None], np.einsum("mij,njk->mnik", TURN, TURN), 0.0)
+_ORDERED += np.swapaxes(_ORDERED, 0, 1) + np.einsum("mn,mij,njk->mnik", np.eye(3), TURN, TURN)
+_LATER = np.where(_EARLIER.T[None], np.einsum("mjn->jmn", TURN), 0.0)
+_AXES = np.einsum("mia,bn->mnabi", TURN, np.eye(3)) - np.einsum("ai,bmn->mnabi", np.eye(3), _LATER)
+"""What the angular momentum of the turning of a point has, for each J_ab psi_l,m psi_k,n, about axis i."""
+_SQUARES = 0.5 * (np.einsum("mnia,bj->mnabij", _ORDERED, np.eye(3)) - np.einsum("mia,nbj->mnabij", TURN, TURN))
+"""What B J B^T has of each, a quarter: that of modes l and k is that of k and l, and equals its transpose."""
+
 
 @dataclass(frozen=True)
 class Mode:
@@ -152,26 +164,19 @@ class ShapeIntegrals:
             raise ModelError("ShapeIntegrals.of_points: inertias need the rotations of their points; give rotations=")
         j, psi = np.asarray(inertias, dtype=float), np.asarray(rotations, dtype=float)
         n = psi.shape[0]
-        tilde = np.zeros((*psi.shape, 3))
-        tilde[..., 0, 1], tilde[..., 0, 2], tilde[..., 1, 2] = -psi[..., 2], psi[..., 1], -psi[..., 0]
-        tilde -= np.swapaxes(tilde, -1, -2)
         spun = np.einsum("pij,kpj->kpi", j, psi)
-        first = np.einsum("kpia,paj->kij", tilde, j, optimize=True)
-        cross, second = np.zeros((n, n, 3)), np.zeros((n, n, 3, 3))
-        for l in range(n):
-            tilde_j = np.einsum("pia,paj->pij", tilde[l], j)
-            for k in range(n):
-                # psi_l x psi_k less what the axes of mode k turn by mode l: the products of a later with an earlier one
-                early = np.cross(psi[l], psi[k]) - _turned_axis(psi[l], psi[k])
-                cross[l, k] = np.cross(psi[l], spun[k]).sum(axis=0) - np.einsum("pij,pj->i", j, early)
-                if k < l:
-                    continue
-                quadratic = -np.einsum("pia,paj->ij", tilde_j, tilde[k])
-                ordered = np.einsum("pij,pjk->ik", _ordered_products(psi[l], psi[k]), j)
-                total = quadratic + ordered
-                second[l, k] = second[k, l] = total + total.T
+        first = np.einsum("mia,paj,kpm->kij", TURN, j, psi, optimize=True)
+        # sums over the points of J_ab psi_l,m psi_k,n, of which all of second order is made
+        flat = np.swapaxes(psi, 0, 1).reshape(-1, 3 * n)
+        products = (np.einsum("pab,lpm->ablmp", j, psi) @ flat).reshape(3, 3, n, 3, n, 3)
+        cross = np.tensordot(products, _AXES, ((3, 5, 0, 1), (0, 1, 2, 3)))
+        second = np.tensordot(products, _SQUARES, ((3, 5, 0, 1), (0, 1, 2, 3)))
+        second = second + np.swapaxes(second, 0, 1)
         mass = np.einsum("kpi,lpi->kl", psi, spun)
-        return cls(mass, np.zeros((n, 3)), spun.sum(axis=1), cross, first + np.swapaxes(first, 1, 2), second)
+        return cls(
+            mass, np.zeros((n, 3)), spun.sum(axis=1), cross, first + np.swapaxes(first, 1, 2),
+            second + np.swapaxes(second, 2, 3),
+        )  # fmt: skip
 
     def without_rounding(self, inertia: np.ndarray) -> ShapeIntegrals:
         """Return the integrals with zeros where nothing but rounding is, by Schwarz's bounds: fewer terms to carry."""
@@ -225,20 +230,6 @@ class ShapeIntegrals:
             self.first,
             self.second - (2.0 * squares[:, :, None, None] * np.eye(3) - products - np.swapaxes(products, 2, 3)),
         )
-
-
-def _turned_axis(before: np.ndarray, psi: np.ndarray) -> np.ndarray:
-    """Return sum_(m<n) before_m psi_n e_m x e_n: the change of the axis ``psi`` by turns ``before``, shape (p, 3)."""
-    x, y = before[:, 0], before[:, 1]
-    return np.column_stack([y * psi[:, 2], -x * psi[:, 2], x * psi[:, 1]])
-
-
-def _ordered_products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return sum_mn one_m other_n e_min~ e_max~, shape (p, 3, 3); e_m~ e_n~ = e_n e_m^T - (e_m . e_n) 1."""
-    products = one[:, :, None] * other[:, None, :]
-    trace = np.einsum("pii->p", products)
-    out = np.tril(products + np.swapaxes(products, 1, 2), -1)
-    return out + np.einsum("pii->pi", products)[:, :, None] * np.eye(3) - trace[:, None, None] * np.eye(3)
 
 
 @dataclass(eq=False)
