@@ -312,6 +312,10 @@ def _housing(where: str, name: str, settings: dict[str, Any], folder: Path) -> H
     return _of_kind(where, Housing, name, settings)
 
 
+BESIDE = ("assembly", "bulk")
+"""Keys of a finite-element model that name a file beside the others."""
+
+
 def _from_folder(where: str, model: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return the table of a finite-element model with the files that it names, by their full paths."""
     table = dict(model)
@@ -321,4 +325,4 @@ def _from_folder(where: str, model: Mapping[str, Any], folder: Path) -> dict[str
     require(texts, f"{where}.model: files is {files!r}; give a list of texts")
     if files:
         table["files"] = [folder / file for file in files]
-    return table
+    return table | {key: folder / table[key] for key in BESIDE if isinstance(table.get(key), str)}

@@ -220,11 +220,11 @@ System = tuple[int, np.ndarray, np.ndarray]
 """Kind, origin and axes (columns) of a coordinate system in the basic one."""
 
 
-def op2_tables(file: Path, matrices: list[str]) -> dict[str, Any]:
+def op2_tables(file: Path, matrices: list[str], grids: GridTable | None = None) -> dict[str, Any]:
     """Return matrices, eigenvalues (``lama``), weights (``ogpwg``), grid points and names of blocks of an op2 file.
 
-    Grid points are those of EQEXIN, BGPDT and GEOM1; where one of these is missing or they do not fit each other, those
-    of GEOM1 alone (:func:`bulk_grids`).
+    Grid points are those given, or of EQEXIN, BGPDT and GEOM1; where one of these is missing or they do not fit each
+    other, those of GEOM1 alone (:func:`bulk_grids`).
 
     Raises
     ------
@@ -238,7 +238,7 @@ def op2_tables(file: Path, matrices: list[str]) -> dict[str, Any]:
             names = [str(name) for name in opened.dbnames]
             lacking = [block for block in GRID_BLOCKS if not any(name.startswith(block) for name in names)]
             found = None
-            if not lacking:
+            if not lacking and grids is None:
                 try:
                     found = opened.rdparampost(get_mats=matrices or False, get_dr_tables=False)
                     found["grids"] = GridTable.of(found["uset"])
@@ -248,13 +248,13 @@ def op2_tables(file: Path, matrices: list[str]) -> dict[str, Any]:
             if found is not None:
                 _check_places(file, found["grids"])
                 return found | {"names": names}
-            grids = bulk_grids(file)
+            grids = bulk_grids(file) if grids is None else grids
             if grids is None:
                 missing = f"{', '.join(lacking)} {'is' if len(lacking) == 1 else 'are'} missing"
                 raise FlexibleError(
                     f"{file.name}: it has no grid points ({missing if lacking else 'GEOM1 is without'}; GEOM1 alone "
-                    "would do); write it with PARAM,POST,-1 and without PARAM,OGEOM,NO. Data blocks: "
-                    f"{', '.join(names) or 'none'}"
+                    "would do); write it with PARAM,POST,-1 and without PARAM,OGEOM,NO, or give modes their bulk data. "
+                    f"Data blocks: {', '.join(names) or 'none'}"
                 )
             out = {"names": names, "grids": grids, "lama": _eigenvalues(opened, names), "ogpwg": opened.rdop2gpwg()}
             return out | opened.rdop2mats(names=matrices, lower=True) if matrices else out

@@ -1,4 +1,4 @@
-"""Masses of grid points from the elements of a Nastran op2 file: GEOM2, EPT and MPT, as they stand in the input.
+"""Masses of grid points from the elements of a Nastran op2 file: GEOM2, EPT and MPT, or from its bulk data.
 
 Public files of modes have their elements, but hardly ever a mass matrix. Each element's mass, density times volume and
 what is not structural, is lumped at its corners: of lines half at each end, of surfaces and solids by the volumes at
@@ -6,12 +6,14 @@ the corners. That is what Nastran does without ``PARAM,COUPMASS``, but for point
 none. Which modes are orthogonal in it, and whether the total is the printed one, is checked where it is used.
 
 A record begins with a key of three words that names its entry; rows of whole numbers and numbers of one width follow.
+Most entries of bulk data have the same fields in the same order, so that both are read by one set of rules.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,7 @@ BLOCKS = ("GEOM2", "EPT", "MPT")
 END = (65535, 65535)
 """Key of the record that ends a block."""
 PROPERTY = 1
-"""Word of an element that holds its property; the grid points follow."""
+"""Word of an element that holds its property."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,15 @@ class Entry:
     corners : int
     thickness : int
         Word at which thicknesses at the corners begin; 0 where it has none.
+    first : int
+        Word of the first corner.
     """
 
     name: str
     words: tuple[int, ...]
     corners: int
     thickness: int = 0
+    first: int = 2
 
 
 LINES = {
@@ -63,6 +68,7 @@ SURFACES = {
 SOLIDS = {
     (5508, 55): Entry("CTETRA", (12,), 4), (17200, 172): Entry("CPYRAM", (16,), 5),
     (4108, 41): Entry("CPENTA", (17,), 6), (7308, 73): Entry("CHEXA", (22,), 8),
+    (7108, 71): Entry("CPENTA of layers", (18,), 6, first=3), (7708, 77): Entry("CHEXA of layers", (23,), 8, first=3),
 }  # fmt: skip
 ROD, POINT_MASS = (1601, 16), (1501, 15)
 """CONROD and CONM2."""
@@ -78,11 +84,34 @@ BRICKS = {4: (0, 1, 2, 2, 3, 3, 3, 3), 5: (0, 1, 2, 3, 4, 4, 4, 4), 6: (0, 1, 2,
 """Corners of surfaces as a quadrilateral, of solids as a brick, some of whose corners fall together."""
 GAUSS = 3.0**-0.5
 """Place of the two points of a rule on (-1, 1) that is exact for volumes of bricks with straight edges."""
+LAYER = 8
+"""Words of a layer of PCOMPS, of what comes before the first, and of the end, all -1."""
 BASIC_CENTRE = -1
 """Coordinate system of a CONM2 whose centre is given by its place and not by an offset."""
 
+PROPERTIES = {
+    "PBAR": ("EPT", (52, 20), 19), "PROD": ("EPT", (902, 9), 6), "PTUBE": ("EPT", (1602, 16), 5),
+    "PBEAM": ("EPT", (5402, 54), 197), "PSHELL": ("EPT", (2302, 23), 11), "PSHEAR": ("EPT", (1002, 10), 6),
+    "PCOMP": ("EPT", (2706, 27), 0), "PCOMPG": ("EPT", (2706, 27), 0), "PCOMPS": ("EPT", (16006, 160), 0),
+    "PSOLID": ("EPT", (2402, 24), 7),
+    "MAT1": ("MPT", (103, 1), 12), "MAT2": ("MPT", (203, 2), 17), "MAT8": ("MPT", (2503, 25), 19),
+    "MAT9": ("MPT", (2603, 26), 35), "MAT11": ("MPT", (2903, 29), 32),
+}  # fmt: skip
+"""Block, key and words of the entries of properties and materials; a laminate has as many words as layers need."""
+LIGHT = {
+    "CBUSH", "CBUSH1D", "CDAMP1", "CDAMP2", "CDAMP3", "CDAMP4", "CDAMP5", "CELAS1", "CELAS2", "CELAS3", "CELAS4",
+    "CFAST", "CGAP", "CVISC",
+}  # fmt: skip
+"""Entries of elements without a mass."""
+NO_ELEMENTS = ("CORD", "CSET", "CAERO", "CEND", "CLOAD", "CYAX", "CYJOIN", "CREEP", "CSUPER", "CSSCHD", "CONV")
+"""Beginnings of entries that begin as elements do and are none."""
+BLANK = 8
+"""Field of a CONM2 that is left blank, so that its record has a word less."""
+CHARACTERS = 8
+"""Of the name of an entry; what is longer is of the executive or the case control."""
 
-def element_masses(file: Path, table: GridTable) -> tuple[np.ndarray, np.ndarray, float]:
+
+def element_masses(file: Path, table: GridTable, cards: Path | None = None) -> tuple[np.ndarray, np.ndarray, float]:
     """Return masses (N,) and inertias (N, 3, 3) at the grid points of a file, in its units, and its WTMASS.
 
     That factor is in them; the grid point weight generator prints weights without it.
@@ -91,6 +120,8 @@ def element_masses(file: Path, table: GridTable) -> tuple[np.ndarray, np.ndarray
     ----------
     file : Path
     table : GridTable
+    cards : Path, optional
+        Bulk data that the elements are read from instead.
 
     Raises
     ------
@@ -102,13 +133,13 @@ def element_masses(file: Path, table: GridTable) -> tuple[np.ndarray, np.ndarray
     UserWarning
         Of point masses beside their grid points, whose offset counts in inertias and not in the centre of mass.
     """
-    bulk = _Bulk.of(file, table)
+    bulk = _Bulk.of(file, table) if cards is None else _Bulk.of_cards(cards, table)
     masses, inertias = np.zeros(len(table.ids)), np.zeros((len(table.ids), 3, 3))
     strange = [CMASS.get(key, str(key)) for key in bulk.records["GEOM2"] if not _known(key)]
     if strange:
         raise FlexibleError(
-            f"{file.name}: what its elements {', '.join(strange)} weigh is not read; export MGG (OUTPUT2), "
-            "or give masses"
+            f"{bulk.file.name}: what its elements {', '.join(strange)} weigh is not read; export MGG (OUTPUT2), "
+            "or give masses or bulk"
         )
     for places, share in bulk.shares():
         np.add.at(masses, places, share)
@@ -120,7 +151,7 @@ def element_masses(file: Path, table: GridTable) -> tuple[np.ndarray, np.ndarray
     if not masses.any():
         raise FlexibleError(
             f"{file.name}: modes without masses of the grid points make no body, and neither MGG nor elements with a "
-            "mass are in it; export MGG (OUTPUT2), or give masses"
+            "mass are in it; export MGG (OUTPUT2), or give masses or bulk"
         )
     if aside > 0.0:
         warn(f"{file.name}: point masses beside their grid points (CONM2 with an offset) are taken at these, with the "
@@ -154,6 +185,29 @@ class _Bulk:
             told = b"".join(block_records(opened, "PVT0")) if "PVT0" in opened.dbnames else b""
         return cls(file, table, records, integer, real, _parameter(told, "WTMASS", real))
 
+    @classmethod
+    def of_cards(cls, path: Path, table: GridTable) -> _Bulk:
+        """Return what bulk data hold, as records whose words have 8 bytes."""
+        records: dict[str, dict[Key, bytes]] = {block: {} for block in BLOCKS}
+        elements = {entry.name: ("GEOM2", key, entry.words[0]) for kinds in (LINES, SURFACES, SOLIDS)
+                    for key, entry in kinds.items()}  # fmt: skip
+        elements |= {"CONROD": ("GEOM2", ROD, 8), "CONM2": ("GEOM2", POINT_MASS, 13)}
+        elements |= {name: ("GEOM2", key, 0) for key, name in CMASS.items()}
+        factor, strange = 1.0, set()
+        for name, *fields in read_cards(path):
+            if name == "PARAM" and fields[:1] == ["WTMASS"]:
+                factor = float(fields[1])
+            elif name in elements or name in PROPERTIES:
+                block, key, width = elements.get(name) or PROPERTIES[name]
+                records[block][key] = records[block].get(key, b"") + _words(name, fields, width)
+            elif name[0] == "C" and name not in LIGHT and not name.startswith(NO_ELEMENTS):
+                strange.add(name)
+        if strange:
+            raise FlexibleError(
+                f"{path.name}: what its elements {', '.join(sorted(strange))} weigh is not read; give masses"
+            )
+        return cls(path, table, records, "<i8", "<f8", factor)
+
     def rows(self, block: str, key: Key, width: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the rows of a record as whole numbers and as numbers; none if there is no such record."""
         data = self.records[block].get(key, b"")
@@ -166,9 +220,11 @@ class _Bulk:
         return whole, real
 
     def densities(self) -> dict[int, float]:
-        """Return densities by number of the material: MAT1, MAT2, MAT8, MAT9."""
+        """Return densities by number of the material: MAT1, MAT2, MAT8, MAT9, MAT11."""
         out: dict[int, float] = {}
-        for key, width, place in (((103, 1), 12, 4), ((203, 2), 17, 7), ((2503, 25), 19, 7), ((2603, 26), 35, 22)):
+        for key, width, place in (
+            ((103, 1), 12, 4), ((203, 2), 17, 7), ((2503, 25), 19, 7), ((2603, 26), 35, 22), ((2903, 29), 32, 10),
+        ):  # fmt: skip
             whole, real = self.rows("MPT", key, width)
             out.update(zip(whole[:, 0].tolist(), real[:, place].astype(float).tolist()))
         return out
@@ -198,8 +254,8 @@ class _Bulk:
     def of_material(self, rho: dict[int, float], number: int) -> float:
         if int(number) not in rho:
             raise FlexibleError(
-                f"{self.file.name}: the density of material {int(number)} is not in MPT (MAT1, MAT2, MAT8, MAT9); "
-                "give masses"
+                f"{self.file.name}: the density of material {int(number)} is not in MPT (MAT1, MAT2, MAT8, MAT9, "
+                "MAT11); give masses"
             )
         return rho[int(number)]
 
@@ -228,15 +284,28 @@ class _Bulk:
         return out
 
     def per_volume(self) -> dict[int, tuple[float, float, float]]:
-        """Return densities by number of the property: PSOLID."""
+        """Return densities by number of the property: of PSOLID, and of PCOMPS the mean of its layers."""
         rho = self.densities()
         whole, _ = self.rows("EPT", (2402, 24), 7)
-        return {int(one[0]): (self.of_material(rho, one[1]), 1.0, 0.0) for one in whole}
+        out = {int(one[0]): (self.of_material(rho, one[1]), 1.0, 0.0) for one in whole}
+        whole, real = self.rows("EPT", (16006, 160), LAYER)
+        at = 0
+        while at < len(whole):
+            end = at + 1 + int(np.argmax(whole[at + 1 :, 0] < 0))
+            thick = real[at + 1 : end, 2].astype(float)
+            if not thick.sum() > 0.0:
+                raise FlexibleError(
+                    f"{self.file.name}: PCOMPS {whole[at, 0]} has no layers with a thickness; give masses"
+                )
+            mean = [self.of_material(rho, one[1]) for one in whole[at + 1 : end]] @ thick / thick.sum()
+            out[int(whole[at, 0])] = (float(mean), 1.0, 0.0)
+            at = end + 1
+        return out
 
     def elements(self, entry: Entry, key: Key, properties: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return properties, rows of the grid points of the corners, and thicknesses of one kind of elements."""
         data, row = self.records["GEOM2"].get(key, b""), {int(k): i for i, k in enumerate(self.table.ids)}
-        first = PROPERTY + 1
+        first = entry.first
         for width in entry.words:
             if len(data) % (width * int(self.integer[-1])):
                 continue
@@ -298,6 +367,91 @@ class _Bulk:
                     "basic one, or give masses and inertias"
                 )
             yield at, float(real[3]), offset, inertia
+
+
+def read_cards(path: Path) -> list[list[Any]]:
+    """Return the entries of bulk data, each its name and its fields; "" where they are blank."""
+    try:
+        found = pyyeti_module("bulk", "bulk data").rdcards(
+            str(path), "[A-Za-z]", regex=True, return_var="list", keep_name=True
+        )
+    except (OSError, ValueError, IndexError, RuntimeError) as error:
+        raise FlexibleError(f"{path.name}: it cannot be read as bulk data ({type(error).__name__}: {error})") from None
+    names = [str(card[0]).strip().upper() for card in found or []]
+    if any(name.startswith("BEGIN SU") for name in names):
+        raise FlexibleError(f"{path.name}: it holds superelements (BEGIN SUPER); give the bulk data of one")
+    return [[name.rstrip("*"), *card[1:]] for name, card in zip(names, found or []) if len(name) <= CHARACTERS]
+
+
+def bulk_table(path: Path) -> GridTable:
+    """Return the grid points of bulk data in the order of their numbers.
+
+    Raises
+    ------
+    FlexibleError
+        If there is no such file, or no grid points in it.
+    """
+    bulk = pyyeti_module("bulk", "bulk data")
+    if not path.is_file():
+        raise FlexibleError(f"{path.name}: there is no such file")
+    try:
+        uset = bulk.bulk2uset(str(path))[0]
+    except Exception as error:
+        raise FlexibleError(f"{path.name}: its grid points cannot be read ({type(error).__name__}: {error})") from None
+    if not len(uset):
+        raise FlexibleError(f"{path.name}: it has no grid points (GRID); give the file with the bulk data")
+    table = GridTable.of(uset)
+    order = np.argsort(table.ids, kind="stable")
+    rows = np.lexsort((table.dofs[:, 1], table.dofs[:, 0]))
+    return GridTable(table.ids[order], table.positions[order], table.axes[order], table.dofs[rows])
+
+
+def _words(name: str, fields: list[Any], width: int) -> bytes:
+    """Return the fields of an entry as words of 8 bytes, as many as a record has of it."""
+    if name == "CONM2":
+        fields = fields[: BLANK - 1] + fields[BLANK:]
+    elif name == "PBEAM":
+        fields = _stations(fields)
+    elif name in ("PCOMP", "PCOMPG"):
+        size, first = (4, 0) if name == "PCOMP" else (8, 1)
+        layers = [(fields[k + first : k + size] + [0] * 4)[:4] for k in range(8, len(fields), size)]
+        layers = [layer for layer in layers if any(isinstance(x, int | float) for x in layer)]
+        # materials and thicknesses that are blank are those of the layer before
+        for before, layer in pairwise(layers):
+            layer[:2] = [x or y for x, y in zip(layer[:2], before)]
+        sign = -1 if "SYM" in fields[:8] else 1
+        fields = [fields[0], sign * len(layers), *fields[1:7], *(x for one in layers for x in one)]
+        width = len(fields)
+    elif name == "PCOMPS":
+        width = LAYER * (1 + -(-len(fields) // LAYER))
+        fields = [*fields, *[0] * (width - LAYER - len(fields)), *[-1] * LAYER]
+    out = np.zeros(width or 1, dtype="<i8")
+    for k, value in enumerate(fields[: len(out)]):
+        if isinstance(value, float):
+            out[k : k + 1].view("<f8")[0] = value
+        elif isinstance(value, int):
+            out[k] = value
+    return out.tobytes()
+
+
+def _stations(fields: list[Any]) -> list[Any]:
+    """Return the fields of PBEAM as its record has them: property, material, and up to eleven stations of 16 words."""
+    fields = fields + [""] * 16
+    stations = [["", "", *fields[2:16]]]
+    at = 16
+    while isinstance(fields[at], str) and fields[at].startswith(("YES", "NO")):
+        told = fields[at : at + 8] + [""] * 8
+        stations.append(told)
+        at += 16 if fields[at] == "YES" else 8
+        fields += [""] * 16
+    # blank at another station is what end A has
+    first = stations[0]
+    stations = [
+        first,
+        *([*one[:2], *(x if x != "" else y for x, y in zip(one[2:], first[2:]))] for one in stations[1:]),
+    ]
+    empty = [[""] * 16] * (11 - len(stations))
+    return [*fields[:2], "", "", "", *(x for one in (*stations, *empty) for x in one)]
 
 
 def corner_shares(corners: np.ndarray) -> np.ndarray:

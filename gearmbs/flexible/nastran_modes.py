@@ -14,7 +14,7 @@ from gearmbs.flexible.material import FlexibleError
 from gearmbs.flexible.matrix_files import FileUnits, Path_
 from gearmbs.flexible.mnf_content import SI, ModalNeutralFile
 from gearmbs.flexible.nastran import GridTable, block_records, op2_tables, pyyeti_module, word_kinds
-from gearmbs.flexible.nastran_masses import element_masses
+from gearmbs.flexible.nastran_masses import bulk_table, element_masses
 from gearmbs.flexible.reduction import nodal_lumps
 from gearmbs.flexible.stress import COMPONENTS, StressModes
 from gearmbs.units import Quantity
@@ -198,6 +198,7 @@ def read_op2_modes(
     path: Path_,
     masses: Any = None,
     *,
+    bulk: Path_ | None = None,
     inertias: npt.ArrayLike | None = None,
     length: Quantity = 1.0,
     mass_unit: Quantity = 1.0,
@@ -217,6 +218,9 @@ def read_op2_modes(
     masses : array_like of float, shape (N,), or matrix, shape (d, d), optional
         At the grid points in the order of their numbers, in the file's unit; or the mass matrix of the g-set in the
         basic coordinate system. Default: MGG of the file; without it those of its elements, lumped at their corners.
+    bulk : str or Path, optional
+        Bulk data of the analysis (.bdf, .dat, with what they include), where the op2 file is without them, as of
+        ``PARAM,OGEOM,NO``: grid points and elements are read from there.
     inertias : array_like, shape (N, 3, 3), optional
         Of the grid points.
     length, mass_unit : float or str
@@ -237,7 +241,9 @@ def read_op2_modes(
     """
     length, _, mass_unit = FileUnits.of(length, 1.0, mass_unit)
     file = Path(path)
-    blocks = op2_tables(file, ["MGG"] if masses is None else [])
+    cards = None if bulk is None else Path(bulk)
+    own = None if cards is None else bulk_table(cards)
+    blocks = op2_tables(file, ["MGG"] if masses is None else [], own)
     table = blocks["grids"]
     lama = blocks.get("lama")
     if lama is not None and not len(lama):
@@ -249,7 +255,7 @@ def read_op2_modes(
         )
     factor, elements = 1.0, masses is None and "mgg" not in blocks
     if elements:
-        masses, inertias, factor = element_masses(file, table)
+        masses, inertias, factor = element_masses(file, table, cards)
     elif masses is None:
         masses = table.in_basic(blocks["mgg"])
     lumped, turning = _nodal_masses(masses, inertias, table, file)

@@ -445,6 +445,18 @@ def test_what_a_housing_of_finite_elements_is_refused_for():
             _ = train.with_parts(replace(train.housings[0], **changed)).modal_models
 
 
+FOOT = "[housings.case.mounts.foot]\nat = [0.0, 0.0, 0.0]\nstiffness = [1e8, 1e8, 1e8]\n"
+
+
+def test_bulk_data_are_looked_for_beside_the_description(tmp_path):
+    pytest.importorskip("pyyeti.nastran.op2")
+    (tmp_path / "x.bdf").write_text("BEGIN BULK\nENDDATA\n")
+    model = '{ program = "op2 modes", files = ["x.op2"], bulk = "x.bdf" }'
+    (tmp_path / "x.toml").write_text(f"[shafts.a]\n[housings.case]\nmodel = {model}\n{FOOT}")
+    with pytest.raises(DrivetrainError, match=says("x.bdf", "no grid points")):
+        Drivetrain.from_file(tmp_path / "x.toml")
+
+
 @pytest.mark.slow
 def test_a_mode_in_which_shafts_move_is_not_called_by_the_mounts_that_give_way():
     """In bearings that are soft along them shafts slide; by its mounts only the case is called, if it moves most."""

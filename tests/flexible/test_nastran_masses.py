@@ -5,7 +5,7 @@ import pytest
 
 from gearmbs.flexible import FlexibleError, read_op2_modes
 from gearmbs.flexible.nastran import op2_tables
-from gearmbs.flexible.nastran_masses import corner_shares, element_masses
+from gearmbs.flexible.nastran_masses import bulk_table, corner_shares, element_masses
 from tests.flexible.op2_files import Op2Writer
 from tests.says import says
 
@@ -151,3 +151,106 @@ def test_masses_that_are_not_those_of_the_modes_are_named(tmp_path):
     writer.modes(np.arange(1, 6), shapes, np.array([-5.5e4, 2.0e5]), np.ones(2))
     with pytest.raises(FlexibleError, match=says("mode 1", "-5.5e", "not stable")):
         read_op2_modes(writer.write(tmp_path / "f.op2"))
+
+
+# --- bulk data ------------------------------------------------------------------------------------
+
+CARDS = {
+    "bar": (["CBAR,1,5,1,2,0.,0.,1."], {(2408, 24): [(1, 5, 1, 2, *(0.0,) * 12)]}),
+    "rod": (["CROD,1,6,1,2"], {(3001, 30): [(1, 6, 1, 2)]}),
+    "conrod": (["CONROD,1,1,2,1,.5,,,.25"], {(1601, 16): [(1, 1, 2, 1, 0.5, 0.0, 0.0, 0.25)]}),
+    "tube": (["CTUBE,1,7,1,2"], {(3701, 37): [(1, 7, 1, 2)]}),
+    "quad": (["CQUAD4,1,8,1,2,3,4"], {(2958, 51): [(1, 8, 1, 2, 3, 4, *(0.0,) * 8)]}),
+    "thick": (["CQUAD4,1,8,1,2,3,4,,,+", "+,,,.5,.5,.5,.5"],
+              {(2958, 51): [(1, 8, 1, 2, 3, 4, *(0.0,) * 4, *(0.5,) * 4)]}),
+    "laminate": (["CQUAD4,1,10,1,2,3,4"], {(2958, 51): [(1, 10, 1, 2, 3, 4, *(0.0,) * 8)]}),
+    "hexa": (["CHEXA,1,9,1,2,3,4,5,6,+", "+,7,8"], {(7308, 73): [(1, 9, *range(1, 9), *(0,) * 12)]}),
+    "mass": (["CONM2,1,2,0,3.,0.,0.,0.,,+", "+,2.,0.,4.,0.,0.,6."],
+             {(1501, 15): [(1, 2, 0, 3.0, *NONE, 2.0, 0.0, 4.0, 0.0, 0.0, 6.0)]}),
+}  # fmt: skip
+BOTH = ["MAT1,1,1.,,.3,4.", "PBAR,5,1,.5,,,,.25", "PROD,6,1,.5,,,.25", "PTUBE,7,1,2.,.5,.25", "PSHELL,8,1,.1,1,,,,.25",
+        "PSOLID,9,1", "PCOMP,10,,.25,,,,,SYM,+", "+,1,.1,,,,.2"]  # fmt: skip
+
+
+def bulk_file(path, cards, positions=CUBE):
+    """Bulk data with case control before it, half of the grid points in a file of their own."""
+    grids = [f"GRID,{k + 1},,{x:.4f},{y:.4f},{z:.4f}" for k, (x, y, z) in enumerate(positions)]
+    (path.parent / "grids.inc").write_text("\n".join(grids[4:]) + "\n")
+    head = ["SOL 103", "CEND", "METHOD = 1", "BEGIN BULK", "INCLUDE 'grids.inc'"]
+    path.write_text("\n".join([*head, *grids[:4], *cards, "PLOTEL,90,1,2", "CELAS2,91,1.,1,1", "ENDDATA"]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("kind", CARDS)
+def test_bulk_data_weigh_what_their_op2_file_does(tmp_path, kind):
+    cards, elements = CARDS[kind]
+    file = bulk_file(tmp_path / "a.bdf", [*BOTH, *cards])
+    table = bulk_table(file)
+    np.testing.assert_allclose(table.positions, CUBE)
+    masses, inertias, _ = element_masses(file, table, file)
+    expected = masses_of(tmp_path / "a.op2", elements)
+    np.testing.assert_allclose(masses, expected[0], rtol=1e-6)
+    np.testing.assert_allclose(inertias, expected[1], rtol=1e-6)
+    assert masses.any()
+
+
+def test_beams_and_layers_of_bulk_data(tmp_path):
+    """A beam whose end B has the area of end A, and one that grows to 3 A; layers of a solid by their shares."""
+    cards = ["MAT1,1,1.,,.3,4.", "MAT11,2,1.,1.,1.,.3,.3,.3,1.,+", "+,1.,1.,10.", "PBEAM,5,1,.5,1.,1.,,1.,.25,+",
+             "+,,,,,,,,,+", "+,YESA,1.", "PBEAM,6,1,.5,1.,1.,,1.,,+", "+,,,,,,,,,+", "+,NO,1.,1.5",
+             "CBEAM,1,5,1,2,0.,0.,1.", "CBEAM,2,6,3,4,0.,0.,1.",
+             "PCOMPS,11,,,,,,,,+", "+,1,1,.75,,,,,,+", "+,2,2,.25", "CHEXA,3,11,1,2,3,4,5,6,+", "+,7,8"]  # fmt: skip
+    file = bulk_file(tmp_path / "a.bdf", cards)
+    masses = element_masses(file, bulk_table(file), file)[0]
+    solid = (0.75 * 4.0 + 0.25 * 10.0) / 8.0
+    assert masses[:4] == pytest.approx([solid + 0.5 * (RHO * 0.5 + 0.25)] * 2 + [solid + 0.5 * RHO] * 2)
+    assert masses[4:] == pytest.approx([solid] * 4)
+
+
+def test_layered_solids_of_op2_files(tmp_path):
+    layers = (11, 0, 0, 0.0, 0.0, 0.0, 0.0, 0, 1, 1, 0.75, 0.0, 0, 0, 0, 0, 2, 2, 0.25, 0.0, 0, 0, 0, 0, *(-1,) * 8)
+    materials = STEEL | {(2903, 29): [(2, *(0.0,) * 9, 10.0, *(0.0,) * 21)]}
+    brick = {(7708, 77): [(3, 11, 0, *range(1, 9), *(0,) * 12)]}
+    masses = masses_of(tmp_path / "a.op2", brick, {(16006, 160): [layers]}, materials)[0]
+    assert masses == pytest.approx([5.5 / 8.0] * 8)
+
+
+def test_modes_without_geometry_are_a_body_with_their_bulk_data(tmp_path):
+    """Only weights, eigenvalues and shapes are in the file, as of PARAM,OGEOM,NO."""
+    full, expected = chain(tmp_path / "a.op2")
+    known = read_op2_modes(full)
+    writer = Op2Writer()
+    writer.weight(9.0)
+    shapes = np.zeros((4, 5, 6))
+    shapes[:, :, 0] = known.shapes[:, :, 0]
+    writer.modes(np.arange(1, 6), shapes, (2.0 * np.pi * expected) ** 2, np.ones(4))
+    bare = writer.write(tmp_path / "b.op2")
+    with pytest.raises(FlexibleError, match=says("no grid points", "bulk")):
+        read_op2_modes(bare)
+    cards = ["MAT1,1,1.,,.3,4.", "PROD,6,1,.5,,,.25", *(f"CROD,{k},6,{k},{k + 1}" for k in range(1, 5))]
+    found = read_op2_modes(bare, bulk=bulk_file(tmp_path / "b.bdf", cards, ALONG))
+    assert found.mass == pytest.approx(9.0)
+    np.testing.assert_allclose(found.modal_model("chain").frequencies, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("cards", "said"),
+    [
+        (["CMASS2,7,1.,1,1"], ("CMASS2", "give masses")),
+        (["CBEND,7,5,1,2,0.,0.,1."], ("CBEND", "give masses")),
+        (["BEGIN SUPER=1"], ("a.bdf", "BEGIN SUPER")),
+        (["CBAR,7,99,1,2,0.,0.,1."], ("a.bdf", "CBAR", "properties")),
+    ],
+)
+def test_bulk_data_that_are_not_read_are_named(tmp_path, cards, said):
+    file = bulk_file(tmp_path / "a.bdf", [*BOTH, "CROD,1,6,1,2", *cards])
+    with pytest.raises(FlexibleError, match=says(*said)):
+        element_masses(file, bulk_table(file), file)
+
+
+def test_bulk_data_that_are_not_there(tmp_path):
+    with pytest.raises(FlexibleError, match=says("none.bdf", "no such file")):
+        bulk_table(tmp_path / "none.bdf")
+    (tmp_path / "empty.bdf").write_text("BEGIN BULK\nENDDATA\n")
+    with pytest.raises(FlexibleError, match=says("empty.bdf", "grid points")):
+        bulk_table(tmp_path / "empty.bdf")
