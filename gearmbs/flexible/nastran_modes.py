@@ -242,8 +242,8 @@ def read_op2_modes(
     length, _, mass_unit = FileUnits.of(length, 1.0, mass_unit)
     file = Path(path)
     cards = None if bulk is None else Path(bulk)
-    own = None if cards is None else bulk_table(cards)
-    blocks = op2_tables(file, ["MGG"] if masses is None else [], own)
+    grids = None if cards is None else bulk_table(cards)
+    blocks = op2_tables(file, ["MGG"] if masses is None else [], grids)
     table = blocks["grids"]
     lama = blocks.get("lama")
     if lama is not None and not len(lama):

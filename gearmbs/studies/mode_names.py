@@ -269,6 +269,8 @@ def mode_table(named: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame({**rows, **sums, "moves": named["moves"].values}, index=named["mode"].values)
 
 
+RANKINGS = ("gain", "response")
+"""What crossings are ranked by."""
 UNEXCITED = 1e-9
 """Share of a mode's energy that is none: rounding leaves 1e-12, and as little of the damping of a mode without any."""
 
@@ -281,18 +283,20 @@ def gain_of(share: float, ratio: float) -> float:
 
 
 def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Dataset:
-    """Return a Campbell diagram with the names of its modes and the gain of each crossing."""
+    """Return a Campbell diagram with the names of its modes, and gain and response of the housing of each crossing."""
     named = named_modes(train, modes)
     orders = dict(zip(diagram["order"].values.tolist(), diagram["order_name"].values.tolist()))
     gains, on_rims = [], rim_meshes(train)
+    excited = []
     for k, order in zip(diagram["critical_mode"].values, diagram["critical_order"].values):
         one = named.sel(mode=int(k))
         part = orders[float(order)].split(" x ", 1)[1]
+        # all planets of a stage, as if they meshed in the phase that moves the mode most
+        meshes = [m.name for m in train.meshings if part in (m.name, m.group, m.stage)]
+        excited.append(meshes)
         if isinstance(train.parts.get(part), Shaft):
             share = one["kinetic"].sel(body=part)
         else:
-            # all planets of a stage, as if they meshed in the phase that moves the mode most
-            meshes = [m.name for m in train.meshings if part in (m.name, m.group, m.stage)]
             # a ring whose rim bends is one part with its meshes
             told = {ring_meshes_of(on_rims[name][0]) if name in on_rims else name for name in meshes}
             share = one["energy"].sel(part=sorted(told)).sum()
@@ -300,25 +304,76 @@ def with_gains(train: Drivetrain, diagram: xr.Dataset, modes: Modes) -> xr.Datas
         # the force that a mesh carries turns with its wheels, and may make a share that is all but none negative
         gains.append(gain_of(float(share), ratio))
     names = [str(named["name"].sel(mode=int(k)).values) for k in diagram["mode"].values]
+    response = housing_response(train, diagram["critical_frequency"].values, excited)
     return diagram.assign(
         critical_gain=("crossing", np.array(gains, dtype=float), {"units": "1"}),
+        critical_response=("crossing", response, {"units": "m s-2 um-1"}),
         mode_name=("mode", np.asarray(names, dtype=str)),
     )
 
 
-def ranked_crossings(diagram: xr.Dataset) -> pd.DataFrame:
+MICROMETRE = 1e-6
+"""Amplitude of the transmission error that responses of housings are told by, m."""
+
+
+def housing_response(train: Drivetrain, frequencies: np.ndarray, excited: Sequence[Sequence[str]]) -> np.ndarray:
+    """Return how housings answer transmission errors at frequencies: the acceleration of the seat that moves most.
+
+    All modes answer together, at rest under load. Where several meshes excite, their answers are summed as if each came
+    in the worst phase.
+
+    Parameters
+    ----------
+    train : Drivetrain
+    frequencies : ndarray, shape (n,)
+        Hz.
+    excited : sequence of sequences of str
+        The meshes of each frequency that excite, by name.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        m/s^2 for a micrometre; NaN where no mesh excites, or no bearing is in a housing.
+    """
+    seats = [b.name for b in train.bearings if isinstance(train.parts.get(train.carrier(b)), Housing)]
+    meshes = sorted({name for names in excited for name in names})
+    out = np.full(len(frequencies), np.nan)
+    if not seats or not meshes:
+        return out
+    motions = [("marker_velocity", f"{name}.J", axis) for name in seats for axis in "xyz"]
+    plant = train.linearize([("transmission_error", name) for name in meshes], motions)
+    for k, (frequency, names) in enumerate(zip(frequencies, excited)):
+        if names:
+            moved = plant.frequency_response(np.array([frequency]))[0][:, [meshes.index(name) for name in names]]
+            along = np.abs(moved).sum(axis=1).reshape(-1, 3)
+            out[k] = 2.0 * np.pi * frequency * MICROMETRE * np.linalg.norm(along, axis=1).max()
+    return out
+
+
+def ranked_crossings(diagram: xr.Dataset, by: str = "gain") -> pd.DataFrame:
     """Return the crossings of a drivetrain's Campbell diagram, those first that their excitation moves most.
 
     The gain of a mesh is the amplitude of its deflection over that of the harmonic of the transmission error, at the
     crossing and by this mode alone: the mesh's share of the energy over twice the damping ratio. Of a planetary stage
     it is that of all its planets, an upper bound, which phases of its meshes may lower to nothing. Of a shaft, where
-    nothing meshes, it is its share of the kinetic energy over the same.
+    nothing meshes, it is its share of the kinetic energy over the same. The response is what a listener beside the
+    housing asks for: how much the bearing seat in it that moves most accelerates for a micrometre of transmission
+    error, by all modes together, m/s^2; there is none where no bearing is in a housing.
 
     Parameters
     ----------
     diagram : Dataset
         From `gearmbs.studies.train_campbell`.
+    by : {"gain", "response"}
+        What the crossings are ranked by.
+
+    Raises
+    ------
+    ValueError
+        For another ranking, and by a response where there is no housing.
     """
+    if by not in RANKINGS:
+        raise ValueError(f"by is {by!r}; choose one of {', '.join(map(repr, RANKINGS))}")
     orders = dict(zip(diagram["order"].values.tolist(), diagram["order_name"].values.tolist()))
     names = dict(zip(diagram["mode"].values.tolist(), diagram["mode_name"].values.tolist()))
     table = pd.DataFrame(
@@ -329,6 +384,11 @@ def ranked_crossings(diagram: xr.Dataset) -> pd.DataFrame:
             "mode": diagram["critical_mode"].values,
             "name": [names[int(k)] for k in diagram["critical_mode"].values],
             "gain": diagram["critical_gain"].values,
+            "response": diagram["critical_response"].values,
         }
     )
-    return table.sort_values("gain", ascending=False, kind="stable").reset_index(drop=True)
+    if table["response"].isna().all():
+        if by == "response":
+            raise ValueError("by is 'response', but no bearing of the drivetrain is in a housing; rank by 'gain'")
+        table = table.drop(columns="response")
+    return table.sort_values(by, ascending=False, kind="stable").reset_index(drop=True)

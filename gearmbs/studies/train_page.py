@@ -279,13 +279,19 @@ class TrainPage:
             lines += [f"The slowest {MODES} of {len(whole)}; `mode_table(named_modes(train))` has all.", ""]
         if self.campbell is None:
             return [*lines, f"No mode lies below {self.maximum:.5g} Hz.", ""]
+        table = ranked_crossings(self.campbell)
+        heard = "response" in table
+        ranked = ranked_crossings(self.campbell, by="response") if heard else table
         found = [
-            [f"{c.speed_rpm:.5g}", f"{c.frequency_hz:.5g}", c.order, c.name, f"{c.gain:.3g}"]
-            for c in ranked_crossings(self.campbell).head(CROSSINGS).itertuples()
-        ]
+            [f"{c.speed_rpm:.5g}", f"{c.frequency_hz:.5g}", c.order, c.name, f"{c.gain:.3g}",
+             *([f"{c.response:.3g}"] if heard else [])]
+            for c in ranked.head(CROSSINGS).itertuples()
+        ]  # fmt: skip
         header = ["speed of the first drive, rpm", "Hz", "order", "mode", "gain"]
+        header += ["m/s² of a seat for 1 µm"] if heard else []
         by = (
-            "Crossings, by how far the transmission error moves the mode. Friction of the teeth, which acts across the "
+            f"Crossings, by {'how the housing answers' if heard else 'how far the mode is moved by'} the transmission "
+            "error; the gain is of the mode alone. Friction of the teeth, which acts across the "
             "line of action and changes its way at the pitch point, moves modes as well: bending in that plane has a "
             "gain of nothing here, and may lead the spectrum all the same."
         )

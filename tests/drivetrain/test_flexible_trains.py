@@ -172,7 +172,7 @@ def housed(time=TIME):
 
 
 def housed_assembly(train):
-    """Return the matrices of `housed`, the row of its mesh, and rows of the motion of the seat of c."""
+    """Return the matrices of `housed`, the row of its mesh, and rows of the motion of each bearing's seat."""
     out, names = assembly_of(train, (0.03, 0.04))
     block = train.housings[0].model
     start = out.body(block.stiffness.toarray(), block.mass.toarray())
@@ -189,7 +189,7 @@ def housed_assembly(train):
         for row, k, c in zip(out.seat(start, block.positions, inside, mount.at), mount.stiffness, mount.damping):
             out.spring(row, k, c)
     (gear,) = add_meshes(out, train, names, (1,))
-    return out, gear, rows["c"]
+    return out, gear, rows
 
 
 @pytest.mark.slow
@@ -205,11 +205,11 @@ def test_a_housing_of_finite_elements_joins_shafts_at_its_seats_as_matrices_do()
 @pytest.mark.slow
 def test_the_housing_answers_errors_of_the_teeth_as_matrices_do():
     whole = housed()
-    matrices, gear, seat = housed_assembly(whole)
+    matrices, gear, seats = housed_assembly(whole)
     plant = whole.linearize([("transmission_error", "stage")], [("marker_velocity", "c.J", "y")])
     for frequency in (90.0, 400.0, 1300.0):
         expected = matrices.response(K_MESH * gear, frequency, [matrices.row(0, 0.0) + 5])
-        moved = seat[1] @ expected
+        moved = seats["c"][1] @ expected
         s = 2j * np.pi * frequency
         states = np.linalg.solve(s * np.eye(len(plant.A)) - plant.A, plant.B[:, 0])
         found = (plant.C[0] @ states + plant.D[0, 0]) / s
@@ -268,10 +268,20 @@ def test_modes_are_called_by_their_largest_part():
 @pytest.mark.slow
 def test_gains_of_crossings_are_the_deflections_that_matrices_have_there():
     train = housed()
-    matrices, gear, _ = housed_assembly(train)
+    matrices, gear, seats = housed_assembly(train)
     held = [matrices.row(0, 0.0) + 5]
-    ranked = ranked_crossings(train_campbell(train, ["0 rpm", "60000 rpm"], harmonics=1, maximum=12000.0))
+    diagram = train_campbell(train, ["0 rpm", "60000 rpm"], harmonics=1, maximum=12000.0)
+    ranked = ranked_crossings(diagram)
     assert list(ranked["gain"]) == sorted(ranked["gain"], reverse=True)
+    # by what the housing does of a micrometre across the teeth's normal, at the seat that moves most
+    loud = ranked_crossings(diagram, by="response")
+    assert list(loud["response"]) == sorted(ranked["response"], reverse=True)
+    for row in loud.iloc[[0, 3]].itertuples():
+        moved = matrices.response(K_MESH * gear, row.frequency_hz, held) * np.cos(0.2457)
+        most = max(np.linalg.norm(np.abs(np.array(three) @ moved)) for three in seats.values())
+        assert row.response == pytest.approx(1e-6 * (2.0 * np.pi * row.frequency_hz) ** 2 * most, rel=1e-3)
+    with pytest.raises(ValueError, match=says("loudness", "gain", "response")):
+        ranked_crossings(diagram, by="loudness")
     best = ranked.iloc[0]
     assert best["order"] == "1 x stage"
     assert best["gain"] > 2.0
