@@ -14,7 +14,7 @@ from gearmbs.gears.geometry import PairGeometry
 from gearmbs.gears.mesh import Mesh
 from gearmbs.gears.modifications import COAST_ALIASES
 from gearmbs.gears.tables import pack
-from gearmbs.gears.transmission import StaticMesh, load_of, static_lag, warn_of_unseen
+from gearmbs.gears.transmission import StaticMesh, first_mate, load_of, static_lag, warn_of_unseen
 from gearmbs.kernels.jit import njit
 from gearmbs.units import Quantity
 
@@ -77,6 +77,7 @@ def contact_pattern(
     sections: int = 41,
     side: str = "drive",
     tooth: int = 0,
+    mate: int | None = None,
 ) -> ContactPattern:
     """Follow a tooth of the driver through the mesh at rest under load.
 
@@ -92,7 +93,9 @@ def contact_pattern(
     side : {"drive", "coast"}
         Flank to analyse; the coast flanks are loaded when misalignment jams the teeth.
     tooth : int
-        Of the driver; numbers wrap around the wheel.
+        Of the driver, in its first turn; numbers wrap around the wheel.
+    mate : int, optional
+        Tooth of the driven wheel that is followed instead, with the tooth of the driver that it meets first.
 
     Returns
     -------
@@ -121,6 +124,10 @@ def contact_pattern(
     mesh = StaticMesh(pair)
     geometry, rotation = mesh.geometry, mesh.rotation
     tooth %= geometry.driver.teeth
+    if mate is not None:
+        # teeth of the driver pass one after the other, and those of the mate with them
+        pitches = mesh.turning * (mate - first_mate(mesh)) % geometry.driven.teeth
+        tooth = -rotation * pitches
     low, high = geometry.common_face
     width = (high - low) / sections
     section = low + (np.arange(sections) + 0.5) * width
@@ -148,7 +155,7 @@ def contact_pattern(
             mine, limits = (found[(found[:, TEETH] == one).all(axis=1)] for found in (rows, ends))
             loads = _pair_load(pair, mine, limits, low, width)
             total[k] += loads.sum() * width
-            if one[0] == tooth:
+            if one[0] == tooth % geometry.driver.teeth:
                 pressure[k] += loads
                 roll_length[k] = np.where(loads > 0, mine[:, ROLL_LENGTH_1], roll_length[k])
     return ContactPattern(roll, section, pressure, roll_length, pressure.sum(axis=1) * width, total)

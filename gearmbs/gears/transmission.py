@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Integral
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -514,16 +514,14 @@ def warn_of_unseen(pair: Mesh, begin: float, end: float, remedy: str, level: int
 
     ``{turn}`` in the remedy stands for the teeth of the faulty wheel, ``level`` for the callers up to the user's line.
     """
-    faulty = [f for f in pair.faults if getattr(f, "tooth", None) is not None or getattr(f, "teeth", "all") != "all"]
+    faulty = [fault for fault in pair.faults if located(fault)]
     if not faulty:
         return
     passing = _passing(pair, begin, end)
     for fault in faulty:
         wheel = int(fault.wheel == "driven")
         z = pair.geometry.wheels[wheel].teeth
-        teeth = getattr(fault, "tooth", None)
-        numbers = {n % z for n in np.atleast_1d(getattr(fault, "teeth", 0) if teeth is None else teeth).tolist()}
-        unseen = sorted(numbers - passing[wheel])
+        unseen = sorted({n % z for n in located(fault)} - passing[wheel])
         if unseen:
             names = ", ".join(map(str, unseen))
             warn(
@@ -537,16 +535,33 @@ def _passing(pair: Mesh, begin: float, end: float) -> tuple[set[int], set[int]]:
     mesh = StaticMesh(pair)
     side, geometry = mesh.rotation, mesh.geometry
     gear, mate = geometry.wheels
-    alpha = geometry.working_pressure_angle
-    middle = gear.base_radius * math.tan(alpha)
-    turned = math.tan(alpha) - gear.base_half_angle - alpha + side * geometry.mesh_angle
-    centre = turned * gear.teeth / (2 * math.pi)
+    middle = gear.base_radius * math.tan(geometry.working_pressure_angle)
+    centre = _pitch_point(mesh)
     first = (geometry.first_roll_lengths[0] - middle - geometry.half_overlap) / gear.base_pitch
     last = (gear.tip_roll_length - middle + geometry.half_overlap) / gear.base_pitch
-    # the tooth of the driven wheel that tooth 0 of the driver meets
-    angle = side * centre * 2 * math.pi / gear.teeth
-    rows = mesh.gaps(angle, mesh.ideal_angle(angle))
-    met = int(rows[(rows[:, SIDE] == side) & (rows[:, TOOTH_1] == 0)][0, TOOTH_2])
+    met = first_mate(mesh)
     turns = range(math.ceil(begin - centre - last), math.floor(end - centre - first) + 1)
     on = mesh.turning
     return {-side * m % gear.teeth for m in turns}, {(met + on * m) % mate.teeth for m in turns}
+
+
+def _pitch_point(mesh: StaticMesh) -> float:
+    """Driver angle at which its tooth 0 touches at the pitch point, in pitch angles and its sense of rotation."""
+    geometry, gear = mesh.geometry, mesh.geometry.driver
+    alpha = geometry.working_pressure_angle
+    turned = math.tan(alpha) - gear.base_half_angle - alpha + mesh.rotation * geometry.mesh_angle
+    return turned * gear.teeth / (2 * math.pi)
+
+
+def first_mate(mesh: StaticMesh) -> int:
+    """Return the tooth of the driven wheel whose drive flank tooth 0 of the driver meets in its first turn."""
+    angle = mesh.rotation * _pitch_point(mesh) * 2 * math.pi / mesh.geometry.driver.teeth
+    rows = mesh.gaps(angle, mesh.ideal_angle(angle))
+    return int(rows[(rows[:, SIDE] == mesh.rotation) & (rows[:, TOOTH_1] == 0)][0, TOOTH_2])
+
+
+def located(fault: Any) -> list[int]:
+    """Return the numbers of the teeth that a fault is on; none where it is on all."""
+    tooth = getattr(fault, "tooth", None)
+    numbers = getattr(fault, "teeth", "all") if tooth is None else tooth
+    return [] if isinstance(numbers, str) else [int(n) for n in np.atleast_1d(numbers)]

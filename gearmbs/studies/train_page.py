@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,6 +20,7 @@ from gearmbs.drivetrain.on_shafts import arrangement
 from gearmbs.files import write_whole
 from gearmbs.gears import GearPair
 from gearmbs.gears.pattern import ContactPattern, contact_pattern
+from gearmbs.gears.transmission import located
 from gearmbs.signals.analysis.report import markdown_table
 from gearmbs.signals.files.simulated import holds_speed
 from gearmbs.studies.mode_names import mode_table, named_modes, ranked_crossings
@@ -84,14 +86,35 @@ class TrainPage:
     def patterns(self) -> dict[str, ContactPattern]:
         """Contact pattern of each mesh under its share of the operating torque; planets of a stage are alike.
 
-        The axes stand to each other as in the loaded position of rest; where there is none, as without load.
+        The axes stand to each other as in the loaded position of rest; where there is none, as without load. Of faults
+        on single teeth there are those teeth besides, each with the one that it meets first.
         """
         out = {}
-        for mesh in one_a_group(self.train):
-            pair, spring = self.train.pairs[mesh.name], self.train.mesh_springs[mesh.name]
-            if isinstance(pair, GearPair) and spring.preload > 0.0:
-                standing = self._standing(mesh.name, pair)
-                out[mesh.group] = contact_pattern(standing, spring.preload * pair.geometry.driven.base_radius)
+        for name, (mesh, teeth) in self._followed.items():
+            pair, spring = self.train.pairs[mesh], self.train.mesh_springs[mesh]
+            standing = self._standing(mesh, pair)
+            with warnings.catch_warnings():
+                # teeth with faults have patterns of their own
+                warnings.filterwarnings("ignore", "(?s).*does not pass the mesh")
+                out[name] = contact_pattern(standing, spring.preload * pair.geometry.driven.base_radius, **teeth)
+        return out
+
+    @cached_property
+    def _followed(self) -> dict[str, tuple[str, dict[str, int]]]:
+        """Mesh and tooth of each pattern, by what it is called."""
+        pairs = {
+            m: self.train.pairs[m.name] for m in self.train.meshings if self.train.mesh_springs[m.name].preload > 0.0
+        }
+        carried = {mesh: pair for mesh, pair in pairs.items() if isinstance(pair, GearPair)}
+        groups = {mesh.name for mesh in one_a_group(self.train)}
+        out: dict[str, tuple[str, dict[str, int]]] = {m.group: (m.name, {}) for m in carried if m.name in groups}
+        for mesh, pair in carried.items():
+            for fault in pair.faults:
+                for tooth in located(fault):
+                    driver = fault.wheel == "driver"
+                    wheel = pair.geometry.wheels[not driver]
+                    told = f"{mesh.group}, tooth {tooth % wheel.teeth} of the {fault.wheel} wheel: {fault.label}"
+                    out.setdefault(told, (mesh.name, {"tooth" if driver else "mate": tooth}))
         return out
 
     def _standing(self, mesh: str, pair: GearPair) -> GearPair:
@@ -237,11 +260,11 @@ class TrainPage:
 
     def _pattern(self) -> list[str]:
         rest, lines = self.train.at_rest, ["## Contact patterns", ""]
-        first = {mesh.group: mesh.name for mesh in one_a_group(self.train)}
         rows = []
         for name, pattern in self.patterns.items():
-            width = self.train.pairs[first[name]].geometry.common_face_width
-            opening = rest.openings.get(first[name])
+            mesh = self._followed[name][0]
+            width = self.train.pairs[mesh].geometry.common_face_width
+            opening = rest.openings.get(mesh)
             rows.append([
                 name,
                 f"{1e-3 * pattern.pressure.max():.4g}",

@@ -89,6 +89,23 @@ def test_any_tooth_can_be_followed():
     assert cracked.force == pytest.approx(same.force, abs=1e-6 * healthy.force.max())
 
 
+@pytest.mark.parametrize(("rotation", "tooth"), [(1, 0), (1, 40), (-1, 51)])
+def test_any_tooth_of_the_driven_wheel_can_be_followed(rotation, tooth):
+    """It meets the driver some turns on; what its root gives is what that of any other does."""
+    wheels = (GearSpec(21, "3 mm", face_width="20 mm"), GearSpec(52, "3 mm", face_width="20 mm"))
+
+    def followed(faults=(), **tooth):
+        pair = GearPair(*wheels, rotation=rotation, torque=100.0, faults=faults)
+        return contact_pattern(pair, points=21, sections=3, **tooth).force
+
+    sound = followed()
+    cracked = followed([RootCrack(depth="3 mm", wheel="driven", tooth=tooth)], mate=tooth)
+    assert cracked.sum() < 0.97 * sound.sum()
+    other = followed([RootCrack(depth="3 mm", wheel="driven", tooth=7)], mate=7)
+    assert cracked == pytest.approx(other, abs=1e-6 * sound.max())
+    assert followed(mate=tooth) == pytest.approx(sound, abs=1e-6 * sound.max())
+
+
 def test_crowning_loads_the_middle():
     pattern = contact_pattern(GearPair.paper(faults=[Crowning(amount="40 um")]), 100.0)
     assert abs(pattern.section[pattern.pressure.sum(axis=0).argmax()]) < 1e-3

@@ -1,6 +1,7 @@
 """The report of a drivetrain for whoever decides."""
 
 import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from gearmbs.drivetrain import (
 )
 from gearmbs.drivetrain.static.rest import Rest
 from gearmbs.gears import GearSpec, planetary
+from gearmbs.gears.faults import Crowning, RootCrack
 from gearmbs.studies import run_train, train_page
 from gearmbs.studies.train_page import TrainPage
 from tests.drivetrain.test_closed_chains import split
@@ -123,7 +125,7 @@ def test_a_record_of_another_drivetrain_is_refused(page):
     assert train_page(page.train, page.record).maximum == 2000.0
 
 
-def one_stage(station, diameter="30 mm", modes=None):
+def one_stage(station, diameter="30 mm", modes=None, settings=None):
     """A spur stage 21/52 in ball bearings, 400 N m; its wheels at a station, the left bearing of the input behind."""
     wheels = [GearSpec(z, "3 mm", face_width="25 mm", bore_radius=bore) for z, bore in ((21, "15 mm"), (52, "20 mm"))]
     first = "80 mm" if station == "20 mm" else "26 mm"
@@ -135,7 +137,7 @@ def one_stage(station, diameter="30 mm", modes=None):
             Shaft(name="o", length="240 mm", diameter="40 mm", modes=modes, wheels={"z2": (station, wheels[1])},
                   bearings={"oa": ("26 mm", "6208"), "ob": ("214 mm", "6208")}),
         ],
-        meshes=[GearMesh(name="m", driver="z1", driven="z2")],
+        meshes=[GearMesh(name="m", driver="z1", driven="z2", settings=settings or {})],
         drives=[SpeedDrive(name="d", shaft="i", speed=157.0)],
         loads=[TorqueLoad(name="l", shaft="o", torque=400.0)],
         running=True,
@@ -162,6 +164,20 @@ def test_patterns_are_of_wheels_as_they_stand_under_load():
     assert rigid.patterns["m"].section[rigid.patterns["m"].pressure.max(axis=0).argmax()] > 0.0
     assert straight.patterns["m"].face_load_factor == pytest.approx(1.0, abs=1e-9)
     assert table("\n".join(rigid._pattern()), "Contact patterns")[0][-1] == "19.54"
+
+
+def test_teeth_with_faults_have_patterns_of_their_own():
+    """Cracks in a tooth of each wheel, crowning of all teeth: one pattern more for each tooth."""
+    faults = [RootCrack(depth="3 mm", tooth=5), RootCrack(depth="3 mm", wheel="driven", tooth=40),
+              Crowning(amount="5 um")]  # fmt: skip
+    found = page_of(one_stage("120 mm", settings={"faults": faults}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        patterns = found.patterns
+    driver, driven = "m, tooth 5 of the driver wheel: root crack", "m, tooth 40 of the driven wheel: root crack"
+    assert list(patterns) == ["m", driver, driven]
+    assert all(patterns[name].force.sum() < 0.98 * patterns["m"].force.sum() for name in (driver, driven))
+    assert [row[0] for row in table("\n".join(found._pattern()), "Contact patterns")] == list(patterns)
 
 
 def test_a_page_without_a_position_of_rest_says_so():
