@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -100,14 +100,14 @@ class TrainPage:
         return out
 
     @cached_property
-    def _followed(self) -> dict[str, tuple[str, dict[str, int]]]:
+    def _followed(self) -> dict[str, tuple[str, dict[str, Any]]]:
         """Mesh and tooth of each pattern, by what it is called."""
         pairs = {
             m: self.train.pairs[m.name] for m in self.train.meshings if self.train.mesh_springs[m.name].preload > 0.0
         }
         carried = {mesh: pair for mesh, pair in pairs.items() if isinstance(pair, GearPair)}
         groups = {mesh.name for mesh in one_a_group(self.train)}
-        out: dict[str, tuple[str, dict[str, int]]] = {m.group: (m.name, {}) for m in carried if m.name in groups}
+        out: dict[str, tuple[str, dict[str, Any]]] = {m.group: (m.name, {}) for m in carried if m.name in groups}
         for mesh, pair in carried.items():
             for fault in pair.faults:
                 for tooth in located(fault):

@@ -242,9 +242,10 @@ def _stage_shapes(train: Drivetrain, stage: PlanetaryStage, tolerance: float) ->
 def train_scene(train: Drivetrain) -> Scene:
     """Return the 3-D view of a drivetrain at its start: shafts with their wheels, housings as boxes, joints.
 
-    Housings are seen through.
+    Each shaft has a colour of its own with all that stands on it, while there are colours; housings are seen through.
     """
     from gearmbs.view import mechanism_scene
+    from gearmbs.view.figures.style import COLOURS
     from gearmbs.view.scene import Part
     from gearmbs.view.scenes import PART_COLOURS, TOLERANCE
     from gearmbs.view.solid import pair_solids
@@ -252,10 +253,9 @@ def train_scene(train: Drivetrain) -> Scene:
     housings = [housing.name for housing in train.housings]
     mechanism = train.build()
     scene = mechanism_scene(mechanism, shapes=train_shapes(train), through=housings, title=train.name)
-    planets = train.planets
-    scene.parts = [
-        replace(part, colour=PART_COLOURS["planet"]) if part.name in planets else part for part in scene.parts
-    ]
+    colours = dict.fromkeys(train.planets, PART_COLOURS["planet"])
+    colours |= {shaft.name: COLOURS[k % len(COLOURS)] for k, shaft in enumerate(train.shafts)}
+    scene.parts = [replace(part, colour=colours.get(part.name, part.colour)) for part in scene.parts]
     for stage in train.planetary_stages:
         # the solids of a ring that is held are on no body of their own
         rim = mechanism.elements.get(ring_meshes_of(stage.name))
@@ -270,7 +270,7 @@ def train_scene(train: Drivetrain) -> Scene:
 # The spectrum of a drivetrain's record with the lines of its kinematic table.
 
 
-HARMONICS, SIDEBANDS = 3, 1
+HARMONICS, SIDEBANDS = 3, 3
 MESH_HARMONICS = 10
 """Harmonics marked of meshes: slow ones have many below the third of the fastest."""
 MESHES = ("mesh ", "sidebands ")
@@ -281,8 +281,9 @@ def train_spectrum(
 ) -> Figure:
     """Draw the spectrum of one channel of a record with the lines of the kinematic table, and name the strongest.
 
-    Marked are ten harmonics of each mesh frequency with their first sidebands, and three of each shaft, hunting-tooth,
-    bearing and pump frequency, where the mean speed of the record puts them.
+    Marked are ten harmonics of each mesh frequency with three sidebands on either side, and three of each shaft,
+    hunting-tooth, bearing and pump frequency, where the mean speed of the record puts them. A peak is named by a
+    bearing only where no line stands that turns with the shafts.
 
     Parameters
     ----------

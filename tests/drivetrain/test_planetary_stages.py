@@ -527,7 +527,10 @@ def test_each_side_of_stepped_planets_excites_at_its_own_frequency():
 
 @pytest.mark.slow
 def test_the_view_shows_planets_carrier_and_a_held_ring():
-    scene = train_scene(two_stages())
+    train = two_stages()
+    scene = train_scene(train)
+    colours = [part.colour for part in scene.parts if part.name in {shaft.name for shaft in train.shafts}]
+    assert len(set(colours)) == len(colours) == len(train.shafts)
     names = [part.name for part in scene.parts]
     assert {"second planet 1", "second ring", "mid", "out"} <= set(names)
     ring = next(part for part in scene.parts if part.name == "second ring")

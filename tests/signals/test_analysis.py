@@ -324,3 +324,6 @@ def test_lines_that_cannot_be_told_apart_have_the_simplest_name():
     ]  # fmt: skip
     # resolved, the sideband has its name
     assert name_lines(lines[:1], known, 0.75).of[0] == "2 x GMF of stage 2 -1 x output"
+    slipping = known | {"7 x BPFO of a": float(lines.frequency[0]) + 0.1}
+    assert name_lines(lines[:1], slipping, 0.75).of[0] == "7 x BPFO of a"
+    assert name_lines(lines[:1], slipping, 0.75, known).of[0] == "2 x GMF of stage 2 -1 x output"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
@@ -50,6 +50,8 @@ LINE_SECONDS = 2.0
 KURTOGRAM_LEVELS = 6
 SAME_LINE = 1e-9
 """Known lines closer than this part of their frequency are one."""
+BEHIND = 100
+"""Rank of a line that others come ahead of, beyond the frequencies that any line is a multiple of."""
 IMPULSIVE = {"best_centre": "centre, Hz", "best_bandwidth": "bandwidth, Hz", "best_kurtosis": "kurtosis - 2"}
 BAND_FEATURES = {"best_centre": "band_centre_hz", "best_bandwidth": "band_width_hz", "best_kurtosis": "band_kurtosis"}
 LOUD = ("CHECK THE", "CLIPPED", "DROP-OUTS")
@@ -121,15 +123,17 @@ def strongest_lines(
     return pd.DataFrame(rows, columns=["channel", "frequency", name, "rms"])
 
 
-def name_lines(lines: pd.DataFrame, known: Mapping[str, float], within: float) -> pd.DataFrame:
+def name_lines(
+    lines: pd.DataFrame, known: Mapping[str, float], within: float, ahead: Collection[str] = ()
+) -> pd.DataFrame:
     """Add the column ``of``: which of the known lines (name to Hz) is nearest, or empty if none is near enough.
 
-    Of lines that are too near to be told apart the simplest is named, a mesh harmonic before a sideband of another:
-    one that is a multiple of fewer frequencies. Lines at one frequency are all named, as those of shafts that turn
-    together.
+    Of lines that are too near to be told apart those named ``ahead`` come first, and of these the simplest, a mesh
+    harmonic before a sideband of another: one that is a multiple of fewer frequencies. Lines at one frequency are all
+    named, as those of shafts that turn together.
     """
     frequencies = np.array(list(known.values()))
-    parts = np.array([name.count(" x ") for name in known])
+    parts = np.array([name.count(" x ") + (0 if name in ahead or not ahead else BEHIND) for name in known])
     names = []
     for f in lines["frequency"]:
         off = np.abs(frequencies - f)

@@ -268,6 +268,10 @@ ROW = 0.2
 """Height of a row of ticks, inches."""
 
 
+LOCKED = ("mesh ", "sidebands ", "shaft ")
+"""Beginnings of what lines are of that turn with the shafts."""
+
+
 def named_lines_plot(
     spectrum: xr.DataArray,
     known: Mapping[str, Mapping[str, float]],
@@ -327,7 +331,10 @@ def _name_strongest(ax: Axes, spectrum: xr.DataArray, known: Mapping[str, Mappin
     """Number the strongest known lines at their peaks, and list their names beside the axes."""
     frequency = spectrum["frequency"].values
     flat = {name: at for lines in known.values() for name, at in lines.items() if at > 0.0}
-    found = name_lines(strongest_lines(spectrum, frequency.size), flat, 1.5 * float(frequency[1] - frequency[0]))
+    # what is locked to the rotation is where it is said to be; bearings, which slip, have many lines that fall upon it
+    locked = {name for part, lines in known.items() if part.startswith(LOCKED) for name in lines}
+    within = 1.5 * float(frequency[1] - frequency[0])
+    found = name_lines(strongest_lines(spectrum, frequency.size), flat, within, locked)
     chosen = found[found.of != ""].drop_duplicates("of").head(count).sort_values("frequency")
     at, height, offset, texts = -np.inf, 0.0, 0.0, []
     for number, line in enumerate(chosen.itertuples(), start=1):
