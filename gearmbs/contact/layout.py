@@ -166,6 +166,10 @@ AT_NODE, AT_FACE_END, AT_TOUCH_END = range(3)
 # --- the pose: centre distance, axial offset, tilt (inclination, skew), spin angles -------------------------
 A, H, P, Q, F1, F2 = range(6)
 
+# --- Gauss's three-point rule over a length of one --------------------------------------------------------
+POINTS = (0.1127016653792583, 0.5, 0.8872983346207417)
+WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+
 # --- scratch -----------------------------------------------------------------------------------------------
 PADDED = 8
 """Columns of 6 x 6 matrices: two spare ones make a row one vector, and lines of the cache."""
@@ -213,6 +217,8 @@ SIDE = record(
     "turn_2",  # angle between neighbouring teeth of wheel 2, rad; negative for an internal one
     "twist_1",  # tangents of the base helix angles as seen on the side of the teeth at work
     "twist_2",
+    "lean",  # cosine of the base helix angle, by which contact lines lean, and its sine as seen on that side
+    "across",
     "pitch_mismatch_bound",  # how much gaps of helical flanks may differ between tooth pairs under a tilt, m
     "reference",  # number of the tooth of wheel 1 whose flanks the sections of the face describe
     "facing",  # number of the tooth of wheel 2 that faces tooth 0 of wheel 1
@@ -296,23 +302,12 @@ LOADS = lanes(
     "tangent",
     ("normal_x", 6),
     ("tangent_x", 6),
-    ("profile", 6),  # unit wrenches of a force along the profile and along the face
-    ("axial", 6),
     "v_profile",  # sliding velocity
     "v_axial",
     "ratio",  # friction coefficient over speed, and the derivative of that by the speed over the speed
     "ratio_slope",
-    "f_profile",  # friction forces
-    "f_axial",
-    "pp",  # their derivatives by the sliding velocity
-    "pa",
-    "aa",
-    ("profile_x", 6),  # their derivatives by the pose
-    ("axial_x", 6),
-    ("profile_v", 6),  # and by the twist
-    ("axial_v", 6),
     ("sliding", 6),  # derivative of the wrench by the normal force
-    ("turned", 6, 6),  # derivatives of the wrench by the pose at constant forces
+    ("moved", 6, 6),  # derivatives of the wrench by the pose, or by the twist
 )
 STRIP = lanes(
     "zeta",  # place of the section along the mean axis

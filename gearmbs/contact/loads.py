@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.forces import derived as D
 from gearmbs.contact.laws import friction_law
-from gearmbs.contact.places import end_roll, lay_directions, lay_slopes, limit_slopes
+from gearmbs.contact.places import end_roll, limit_slopes
 from gearmbs.contact.records import inlined, kernel, summing
 from gearmbs.contact.slices import (
     Cut,
@@ -215,22 +216,6 @@ def add_outer(total, a, b, n):
 
 
 @summing
-def add_two_outers(total, a, b, c, d, n):
-    """Add the sum over the sections of ``a b^T + c d^T``."""
-    for i in range(6):
-        v0 = v1 = v2 = v3 = v4 = v5 = 0.0
-        for j in range(n):
-            x, y = a[i, j], c[i, j]
-            v0 += x * b[0, j] + y * d[0, j]
-            v1 += x * b[1, j] + y * d[1, j]
-            v2 += x * b[2, j] + y * d[2, j]
-            v3 += x * b[3, j] + y * d[3, j]
-            v4 += x * b[4, j] + y * d[4, j]
-            v5 += x * b[5, j] + y * d[5, j]
-        add_six(total, i, (v0, v1, v2, v3, v4, v5))
-
-
-@summing
 def add_stack(total, stack, n):
     """Add the sum over the sections of a matrix a section."""
     for i in range(6):
@@ -298,31 +283,26 @@ def add_normal(sums, strip, loads, n, want):
     add_outer(sums.q_xd, grad, loads.force_xd, n)
 
 
-@kernel
-def friction_directions(side, strip, loads, n):
-    """Fill unit wrenches of friction forces along the profile and the face, and the sliding velocity along them.
+@inlined
+def point_of(side, strip, loads, j):
+    """Return where friction acts in a section: normal, the contact point's place, and how the contact line leans."""
+    place = strip.zeta[j] + 0.5 * side.x[L.H]
+    return strip.sin[j], strip.cos[j], loads.normal[j], loads.tangent[j], place, side.lean, side.across
 
-    The sliding velocity is that of wheel 1 against wheel 2 at the point, without its part along the normal.
-    """
+
+@inlined
+def twist_of(side):
+    """Return the twist of wheel 1 relative to wheel 2 as seen on this side of the teeth."""
     twist = side.twist
-    v0, v1, v2, v3, v4, v5 = twist[0], twist[1], twist[2], twist[3], twist[4], twist[5]
-    half_h = 0.5 * side.x[L.H]
-    profile, axial = loads.profile, loads.axial
+    return twist[0], twist[1], twist[2], twist[3], twist[4], twist[5]
+
+
+@kernel
+def sliding_speeds(side, strip, loads, n):
+    """Fill the sliding velocity of wheel 1 against wheel 2 at the contact points, without its part along the normal."""
+    twist = twist_of(side)
     for j in range(n):
-        sa, ca = strip.sin[j], strip.cos[j]
-        pn, pt = loads.normal[j], loads.tangent[j]
-        zp = strip.zeta[j] + half_h
-        # the point is at pn n + pt t + zp z, n = (sin, cos), t = (cos, -sin): moments about wheel 1 are its products
-        # with t and with z
-        t3, t4 = zp * sa, zp * ca
-        z3, z4 = pn * ca - pt * sa, -pn * sa - pt * ca
-        profile[0, j], profile[1, j], profile[2, j] = ca, -sa, 0.0
-        profile[3, j], profile[4, j], profile[5, j] = t3, t4, -pn
-        axial[0, j], axial[1, j], axial[2, j] = 0.0, 0.0, 1.0
-        axial[3, j], axial[4, j], axial[5, j] = z3, z4, 0.0
-        # a unit wrench times the twist is the velocity along it
-        loads.v_profile[j] = ca * v0 - sa * v1 + t3 * v3 + t4 * v4 - pn * v5
-        loads.v_axial[j] = v2 + z3 * v3 + z4 * v4
+        loads.v_profile[j], loads.v_axial[j] = D.sliding(*twist, *point_of(side, strip, loads, j))
 
 
 @kernel
@@ -340,90 +320,47 @@ def friction_ratios(wheels, kind, loads, n):
 
 
 @summing
-def friction_forces(sums, loads, n, totals):
-    """Fill the friction forces, and add their wrench and their power."""
-    power = 0.0
+def friction_forces(side, sums, strip, loads, n, totals):
+    """Add the wrench of friction and its power."""
+    twist, f = twist_of(side), sums.f
+    f0 = f1 = f2 = f3 = f4 = f5 = power = 0.0
     for j in range(n):
-        # F = -(mu(v)/v) f v, whose power is F . v
-        vt, vz, scale = loads.v_profile[j], loads.v_axial[j], -loads.ratio[j] * loads.force[j]
-        loads.f_profile[j] = scale * vt
-        loads.f_axial[j] = scale * vz
-        power += scale * (vt * vt + vz * vz)
+        x0, x1, x2, x3, x4, x5, lost = D.friction_wrench(
+            *twist, *point_of(side, strip, loads, j), loads.ratio[j], loads.force[j]
+        )  # fmt: skip
+        f0, f1, f2, f3, f4, f5, power = f0 + x0, f1 + x1, f2 + x2, f3 + x3, f4 + x4, f5 + x5, power + lost
+    f[0], f[1], f[2], f[3], f[4], f[5] = f[0] + f0, f[1] + f1, f[2] + f2, f[3] + f3, f[4] + f4, f[5] + f5
     totals.friction_power -= power
-    for i in range(6):
-        value = 0.0
-        for j in range(n):
-            value += loads.f_profile[j] * loads.profile[i, j] + loads.f_axial[j] * loads.axial[i, j]
-        sums.f[i] += value
 
 
 @inlined
-def friction_slope(strip, loads, j, k, spin, dz, half_h):
-    """Fill derivatives of the friction forces of section ``j`` by pose number ``k`` and by that number of the twist.
-
-    Parameters
-    ----------
-    strip, loads : record
-    j, k : int
-    spin : tuple of float
-        Twist, without the velocity along the axis.
-    dz : float
-        Derivative of the contact point's place along the axis.
-    half_h : float
-        Half the axial offset.
-    """
-    v0, v1, v3, v4, v5 = spin
-    sa, ca = strip.sin[j], strip.cos[j]
-    pn, pt, zp = loads.normal[j], loads.tangent[j], strip.zeta[j] + half_h
-    vt, vz, ratio = loads.v_profile[j], loads.v_axial[j], loads.ratio[j]
-    tt, tz, zz = loads.pp[j], loads.pa[j], loads.aa[j]
-    da, dn, dt = strip.alpha_x[k, j], loads.normal_x[k, j], loads.tangent_x[k, j]
-    # how the unit wrenches turn with the pose
-    t3 = dz * sa + zp * ca * da
-    t4 = dz * ca - zp * sa * da
-    un = dn - pt * da
-    ut = dt + pn * da
-    z3 = un * ca - ut * sa
-    z4 = -un * sa - ut * ca
-    dvt = t3 * v3 + t4 * v4 - dn * v5 - da * (sa * v0 + ca * v1)
-    dvz = z3 * v3 + z4 * v4
-    # F by the pose: through f, and through the sliding velocity
-    df = loads.force_x[k, j]
-    loads.profile_x[k, j] = -ratio * vt * df + tt * dvt + tz * dvz
-    loads.axial_x[k, j] = -ratio * vz * df + tz * dvt + zz * dvz
-    t, z = loads.profile[k, j], loads.axial[k, j]
-    loads.profile_v[k, j] = tt * t + tz * z
-    loads.axial_v[k, j] = tz * t + zz * z
-    loads.sliding[k, j] = -ratio * (vt * t + vz * z)
-    ft, fz = loads.f_profile[j], loads.f_axial[j]
-    # and the unit wrenches that F goes with turn
-    loads.turned[0, k, j] = -ft * sa * da
-    loads.turned[1, k, j] = -ft * ca * da
-    loads.turned[2, k, j] = 0.0
-    loads.turned[3, k, j] = ft * t3 + fz * z3
-    loads.turned[4, k, j] = ft * t4 + fz * z4
-    loads.turned[5, k, j] = -ft * dn
+def friction_along(twist, point, laws, strip, loads, j, k, place):
+    """Fill how friction in section ``j`` moves with pose number ``k``; ``place`` is that of the contact point's."""
+    D.friction_along(
+        *twist, *point, *laws, strip.alpha_x[k, j], loads.normal_x[k, j], loads.tangent_x[k, j], place,
+        loads.force_x[k, j], loads.moved, k, j,
+    )  # fmt: skip
 
 
 @kernel
-def friction_slopes(side, strip, loads, n):
-    """Fill derivatives of the friction forces by the pose and the twist, row by row."""
-    half_h = 0.5 * side.x[L.H]
-    spin = (side.twist[0], side.twist[1], side.twist[3], side.twist[4], side.twist[5])
+def friction_slopes(side, sums, strip, loads, n):
+    """Add the derivatives of friction by the pose, by the twist, and by the pose's rates through the normal force."""
+    twist = twist_of(side)
     for j in range(n):
-        vt, vz, force = loads.v_profile[j], loads.v_axial[j], loads.force[j]
-        # R(v) = mu/v: dF_i/dv_j = -f (R delta_ij + (R'/v) v_i v_j)
-        straight, curve = -force * loads.ratio[j], -force * loads.ratio_slope[j]
-        loads.pp[j] = straight + curve * vt * vt
-        loads.pa[j] = curve * vt * vz
-        loads.aa[j] = straight + curve * vz * vz
+        point = point_of(side, strip, loads, j)
+        laws = (loads.ratio[j], loads.force[j], loads.ratio_slope[j])
+        friction_along(twist, point, laws, strip, loads, j, 0, 0.0)
+        friction_along(twist, point, laws, strip, loads, j, 1, 0.5)
+        friction_along(twist, point, laws, strip, loads, j, 2, 0.0)
+        friction_along(twist, point, laws, strip, loads, j, 3, 0.0)
+        friction_along(twist, point, laws, strip, loads, j, 4, 0.0)
+        friction_along(twist, point, laws, strip, loads, j, 5, 0.0)
+    add_stack(sums.f_x, loads.moved, n)
     for j in range(n):
-        friction_slope(strip, loads, j, 0, spin, 0.0, half_h)
-        friction_slope(strip, loads, j, 1, spin, 0.5, half_h)
-        friction_slope(strip, loads, j, 2, spin, 0.0, half_h)
-        friction_slope(strip, loads, j, 3, spin, 0.0, half_h)
-        friction_slope(strip, loads, j, 4, spin, 0.0, half_h)
-        friction_slope(strip, loads, j, 5, spin, 0.0, half_h)
+        laws = (loads.ratio[j], loads.force[j], loads.ratio_slope[j])
+        D.friction_by_twist(*twist, *point_of(side, strip, loads, j), *laws, loads.moved, loads.sliding, j)
+    add_stack(sums.f_twist, loads.moved, n)
+    add_outer(sums.f_xd, loads.sliding, loads.force_xd, n)
 
 
 @kernel
@@ -446,21 +383,11 @@ def add_friction(wheels, kind, side, sums, strip, loads, n, totals, want):
     want : int
         Nonzero to add derivatives.
     """
-    friction_directions(side, strip, loads, n)
-    if side.twist_1 != 0.0:
-        lay_directions(side, strip, loads, n)
+    sliding_speeds(side, strip, loads, n)
     friction_ratios(wheels, kind, loads, n)
-    friction_forces(sums, loads, n, totals)
-    if want == 0:
-        return
-    friction_slopes(side, strip, loads, n)
-    if side.twist_1 != 0.0:
-        lay_slopes(side, strip, loads, n)
-    profile, axial = loads.profile, loads.axial
-    add_two_outers(sums.f_x, profile, loads.profile_x, axial, loads.axial_x, n)
-    add_stack(sums.f_x, loads.turned, n)
-    add_two_outers(sums.f_twist, profile, loads.profile_v, axial, loads.axial_v, n)
-    add_outer(sums.f_xd, loads.sliding, loads.force_xd, n)
+    friction_forces(side, sums, strip, loads, n, totals)
+    if want != 0:
+        friction_slopes(side, sums, strip, loads, n)
 
 
 @kernel

@@ -306,7 +306,7 @@ def contact_points(side, corner, strip, loads, n, f, corners, want):
             S.corner_point_slopes(zeta, h, sa, ca, se, ce, r, rt, turns, grad, normal_x, tangent_x, j, *tilt)
 
 
-# Where the contacts of helical wheels stand, and friction in their tangent plane; loops as in `sections`.
+# Where the contacts of helical wheels stand; loops as in `sections`.
 
 
 @kernel
@@ -349,81 +349,3 @@ def helical_points(side, corner, strip, loads, n, f, corners, want):
             zeta, sa, ca = strip.zeta[j], strip.sin[j], strip.cos[j]
             se, ce, r, rt = corner.sin[j], corner.cos[j], corner.radius[j], corner.rounding[j]
             S.edge_point_slopes(zeta, h, sa, ca, se, ce, r, rt, k, turns, grad, normal_x, tangent_x, j, *tilt)
-
-
-@kernel
-def lay_directions(side, strip, loads, n):
-    """Turn the friction directions along the face into the tangent plane of helical flanks.
-
-    The contact line leans against the normal of the section by the base helix angle. Runs after
-    `sums.friction_directions`, whose directions along the axis it replaces.
-    """
-    lean = 1.0 / np.sqrt(1.0 + side.twist_1 * side.twist_1)
-    across = lean * side.twist_1
-    half, axial, twist = 0.5 * side.x[L.H], loads.axial, side.twist
-    v0, v1, v2, v3, v4, v5 = twist[0], twist[1], twist[2], twist[3], twist[4], twist[5]
-    for j in range(n):
-        sa, ca, pt, zp = strip.sin[j], strip.cos[j], loads.tangent[j], strip.zeta[j] + half
-        axial[0, j] = -across * sa
-        axial[1, j] = -across * ca
-        axial[2, j] = lean
-        axial[3, j] = lean * axial[3, j] + across * zp * ca
-        axial[4, j] = lean * axial[4, j] - across * zp * sa
-        axial[5, j] = -across * pt
-        loads.v_axial[j] = (
-            axial[0, j] * v0 + axial[1, j] * v1 + lean * v2 + axial[3, j] * v3 + axial[4, j] * v4 + axial[5, j] * v5
-        )
-
-
-@inlined
-def lay_slope(loads, j, k, dz, x, leaning, spin):
-    """Complete the derivatives of friction in section ``j`` by pose number ``k``.
-
-    Parameters
-    ----------
-    loads : record
-    j, k : int
-    dz : float
-        Derivative of the contact point's place along the axis.
-    x : tuple of float
-        Sine and cosine of the normal, its turn, the place along the axis.
-    leaning : tuple of float
-        Cosine less one, and sine, of the base helix angle.
-    spin : tuple of float
-        Twist, without the velocity along the axis.
-    """
-    sa, ca, da, zp = x
-    less, across = leaning
-    v0, v1, v3, v4, v5 = spin
-    pn, pt, fz = loads.normal[j], loads.tangent[j], loads.f_axial[j]
-    dn, dt = loads.normal_x[k, j], loads.tangent_x[k, j]
-    un, ut = dn - pt * da, dt + pn * da
-    d0, d1 = -across * ca * da, across * sa * da
-    d3 = less * (un * ca - ut * sa) + across * (dz * ca - zp * sa * da)
-    d4 = -less * (un * sa + ut * ca) - across * (dz * sa + zp * ca * da)
-    d5 = -across * dt
-    moved = d0 * v0 + d1 * v1 + d3 * v3 + d4 * v4 + d5 * v5
-    loads.profile_x[k, j] += loads.pa[j] * moved
-    loads.axial_x[k, j] += loads.aa[j] * moved
-    loads.turned[0, k, j] += fz * d0
-    loads.turned[1, k, j] += fz * d1
-    loads.turned[3, k, j] += fz * d3
-    loads.turned[4, k, j] += fz * d4
-    loads.turned[5, k, j] += fz * d5
-
-
-@kernel
-def lay_slopes(side, strip, loads, n):
-    """Complete the derivatives of friction for the directions of `lay_directions`; runs after `friction_slopes`."""
-    lean = 1.0 / np.sqrt(1.0 + side.twist_1 * side.twist_1)
-    leaning = (lean - 1.0, lean * side.twist_1)
-    half = 0.5 * side.x[L.H]
-    spin = (side.twist[0], side.twist[1], side.twist[3], side.twist[4], side.twist[5])
-    for j in range(n):
-        sa, ca, zp, turn = strip.sin[j], strip.cos[j], strip.zeta[j] + half, strip.alpha_x
-        lay_slope(loads, j, 0, 0.0, (sa, ca, turn[0, j], zp), leaning, spin)
-        lay_slope(loads, j, 1, 0.5, (sa, ca, turn[1, j], zp), leaning, spin)
-        lay_slope(loads, j, 2, 0.0, (sa, ca, turn[2, j], zp), leaning, spin)
-        lay_slope(loads, j, 3, 0.0, (sa, ca, turn[3, j], zp), leaning, spin)
-        lay_slope(loads, j, 4, 0.0, (sa, ca, turn[4, j], zp), leaning, spin)
-        lay_slope(loads, j, 5, 0.0, (sa, ca, turn[5, j], zp), leaning, spin)

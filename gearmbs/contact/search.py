@@ -88,6 +88,8 @@ def set_twist(wheels, side, sign):
     """Fill the wheels' helices as seen on a side, which is a mirror image for ``sign`` -1."""
     side.twist_1 = sign * wheels.wheel_1.twist
     side.twist_2 = sign * wheels.wheel_2.twist
+    side.lean = 1.0 / np.sqrt(1.0 + side.twist_1 * side.twist_1)
+    side.across = side.lean * side.twist_1
 
 
 @kernel

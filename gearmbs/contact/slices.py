@@ -13,13 +13,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gearmbs.contact import layout as L
+from gearmbs.contact.forces import derived as D
 from gearmbs.contact.laws import damping_of_share, elastic_pressure, normal_law, power, pressure
+from gearmbs.contact.layout import POINTS, WEIGHTS
 from gearmbs.contact.records import inlined, kernel, strip_at, summing
 from gearmbs.dae.equations.loads.forces import stored_energy
 from gearmbs.kernels.views import before
-
-POINTS = (0.1127016653792583, 0.5, 0.8872983346207417)
-WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 class Law(NamedTuple):
@@ -124,145 +123,77 @@ def slice_forces(law, strip, loads, n, width, want):
     want : int
         Nonzero to fill derivatives.
     """
-    slice_values(law, strip, loads, n, width)
-    if want != 0:
-        slice_curvatures(law, strip, loads, n, width)
-        clipped_slopes(strip, loads, n)
+    kind, k, e, c, d = law
+    copy = Law(kind, k, e, c, d)
+    m0, m1, m2 = WEIGHTS[0] * width, WEIGHTS[1] * width, WEIGHTS[2] * width
+    for i in range(n):
+        g, low, high = slice_of(strip, loads, i), loads.low[i], loads.high[i]
+        p0, _, _, w0, e0 = at_point(copy, g, low, high, POINTS[0])
+        p1, _, _, w1, e1 = at_point(copy, g, low, high, POINTS[1])
+        p2, _, _, w2, e2 = at_point(copy, g, low, high, POINTS[2])
+        (
+            loads.force_left[i], loads.force_right[i], loads.elastic_left[i], loads.elastic_right[i], loads.energy[i],
+            loads.power[i],
+        ) = D.slice_forces(g.rate, g.next_rate, low, high, m0, m1, m2, p0, p1, p2, e0, e1, e2, w0, w1, w2)  # fmt: skip
+    if want == 0:
+        return
+    for i in range(n):
+        g, low, high = slice_of(strip, loads, i), loads.low[i], loads.high[i]
+        p0, d0, v0, _, _ = at_point(copy, g, low, high, POINTS[0])
+        p1, d1, v1, _, _ = at_point(copy, g, low, high, POINTS[1])
+        p2, d2, v2, _, _ = at_point(copy, g, low, high, POINTS[2])
+        (
+            loads.k_ll[i], loads.k_lr[i], loads.k_rl[i], loads.k_rr[i], loads.r_ll[i], loads.r_lr[i], loads.r_rr[i],
+            loads.left_low[i], loads.right_low[i], loads.left_high[i], loads.right_high[i],
+        ) = D.slice_slopes(
+            g.gap, g.next_gap, g.rate, g.next_rate, low, high, m0, m1, m2, p0, p1, p2, d0, d1, d2, v0, v1, v2,
+            loads.clip_low[i], loads.clip_high[i],
+        )  # fmt: skip
+
+
+class Slice(NamedTuple):
+    """Gaps and their rates at both nodes of a slice; nothing is read beyond one that does not count."""
+
+    counts: bool
+    gap: float
+    next_gap: float
+    rate: float
+    next_rate: float
 
 
 @inlined
-def at_point(law, d0, slope, r0, rs, counts, low, span, t):
+def slice_of(strip, loads, i):
+    """Return the gaps of a slice, and whether it touches."""
+    counts = loads.depth[i] > 0.0
+    gap, rate = strip.gap[i], strip.rate[i]
+    return Slice(counts, gap, strip.gap[i + 1] if counts else gap, rate, strip.rate[i + 1] if counts else rate)
+
+
+@inlined
+def at_point(law, g, low, high, t):
     """Pressure at the fraction ``t`` of the touching part of a slice.
 
     Parameters
     ----------
     law : Law
-    d0, slope, r0, rs : float
-        Penetration and its rate at the left node, and their growth towards the right one.
-    counts : bool
-        Whether the slice touches.
-    low, span, t : float
-        Where the touching part begins, its length, and the point in it, as fractions.
+    g : Slice
+    low, high : float
+        Where the touching part begins and ends, as fractions of the slice.
+    t : float
 
     Returns
     -------
-    u, p, p_depth, p_rate, energy, elastic, power : float
-        Place in the slice, pressure with its derivatives, densities of elastic energy, elastic pressure, damping power.
+    p, p_depth, p_rate, energy, elastic : float
+        Pressure with its derivatives, density of elastic energy, elastic pressure.
     """
-    u = low + span * t
-    depth = d0 + slope * u
-    inside = counts and depth > 0.0
+    u = low + (high - low) * t
+    depth = -g.gap - (g.next_gap - g.gap) * u
+    inside = g.counts and depth > 0.0
     delta = depth if inside else 1.0
-    rate = r0 + rs * u if inside else 0.0
+    rate = -g.rate - (g.next_rate - g.rate) * u if inside else 0.0
     p, p_d, p_r, w, e = pressure(law.kind, law.k * power(delta, law.e), law.e, law.c, law.d, delta, rate)
     on = 1.0 if inside else 0.0
-    return u, on * p, on * p_d, on * p_r, on * w, on * e, on * (p - e) * rate
-
-
-@kernel
-def slice_values(law, strip, loads, n, width):
-    """Fill forces, energy and damping power of the slices; see `slice_forces`."""
-    gap, gap_rate = strip.gap, strip.rate
-    kind, k, e, c, d = law
-    copy = Law(kind, k, e, c, d)
-    w0, w1, w2 = WEIGHTS[0] * width, WEIGHTS[1] * width, WEIGHTS[2] * width
-    t0, t1, t2 = POINTS
-    for i in range(n):
-        counts = loads.depth[i] > 0.0
-        d0, r0 = -gap[i], -gap_rate[i]
-        slope, rs = -gap[i + 1] - d0, -gap_rate[i + 1] - r0
-        low = loads.low[i]
-        span = loads.high[i] - low
-        u0, p0, _, _, a0, e0, b0 = at_point(copy, d0, slope, r0, rs, counts, low, span, t0)
-        u1, p1, _, _, a1, e1, b1 = at_point(copy, d0, slope, r0, rs, counts, low, span, t1)
-        u2, p2, _, _, a2, e2, b2 = at_point(copy, d0, slope, r0, rs, counts, low, span, t2)
-        # Gauss's sum of weight span p(u); a point's force is shared by the nodes as 1 - u and u
-        m0, m1, m2 = w0 * span, w1 * span, w2 * span
-        loads.force_left[i] = m0 * (1.0 - u0) * p0 + m1 * (1.0 - u1) * p1 + m2 * (1.0 - u2) * p2
-        loads.force_right[i] = m0 * u0 * p0 + m1 * u1 * p1 + m2 * u2 * p2
-        loads.elastic_left[i] = m0 * (1.0 - u0) * e0 + m1 * (1.0 - u1) * e1 + m2 * (1.0 - u2) * e2
-        loads.elastic_right[i] = m0 * u0 * e0 + m1 * u1 * e1 + m2 * u2 * e2
-        loads.energy[i] = m0 * a0 + m1 * a1 + m2 * a2
-        loads.power[i] = m0 * b0 + m1 * b1 + m2 * b2
-
-
-@inlined
-def bound_slopes(u, t, span, share, p, grown):
-    """Derivatives of the left and right force by the lower and upper bound, from one point of the touching part.
-
-    ``grown`` is the derivative of the pressure by the place in the slice.
-    """
-    # F = span sum of share v p, or u p, at u = low + span t: as the lower bound moves by one the span falls by one and
-    # u moves by 1 - t, as the upper one does it grows and u moves by t
-    v = 1.0 - u
-    left = span * (v * grown - p) * share
-    right = span * (u * grown + p) * share
-    on_left, on_right = share * v * p, share * u * p
-    return (1.0 - t) * left - on_left, (1.0 - t) * right - on_right, t * left + on_left, t * right + on_right
-
-
-@kernel
-def slice_curvatures(law, strip, loads, n, width):
-    """Fill derivatives of the forces of the slices by gaps, rates and bounds; see `slice_forces`."""
-    gap, gap_rate = strip.gap, strip.rate
-    kind, k, e, c, d = law
-    copy = Law(kind, k, e, c, d)
-    w0, w1, w2 = WEIGHTS[0] * width, WEIGHTS[1] * width, WEIGHTS[2] * width
-    t0, t1, t2 = POINTS
-    for i in range(n):
-        counts = loads.depth[i] > 0.0
-        d0, r0 = -gap[i], -gap_rate[i]
-        slope, rs = -gap[i + 1] - d0, -gap_rate[i + 1] - r0
-        low = loads.low[i]
-        span = loads.high[i] - low
-        u0, p0, d_0, r_0, _, _, _ = at_point(copy, d0, slope, r0, rs, counts, low, span, t0)
-        u1, p1, d_1, r_1, _, _, _ = at_point(copy, d0, slope, r0, rs, counts, low, span, t1)
-        u2, p2, d_2, r_2, _, _, _ = at_point(copy, d0, slope, r0, rs, counts, low, span, t2)
-        m0, m1, m2 = w0 * span, w1 * span, w2 * span
-        v0, v1, v2 = 1.0 - u0, 1.0 - u1, 1.0 - u2
-        # moments of the slopes by depth and rate: dF_left = -(k_ll dg_left + k_lr dg_right), as depths are shared as
-        # forces are
-        ll0, ll1, ll2 = m0 * v0 * v0, m1 * v1 * v1, m2 * v2 * v2
-        lr0, lr1, lr2 = m0 * v0 * u0, m1 * v1 * u1, m2 * v2 * u2
-        rr0, rr1, rr2 = m0 * u0 * u0, m1 * u1 * u1, m2 * u2 * u2
-        loads.k_ll[i] = ll0 * d_0 + ll1 * d_1 + ll2 * d_2
-        loads.k_lr[i] = lr0 * d_0 + lr1 * d_1 + lr2 * d_2
-        loads.k_rr[i] = rr0 * d_0 + rr1 * d_1 + rr2 * d_2
-        loads.r_ll[i] = ll0 * r_0 + ll1 * r_1 + ll2 * r_2
-        loads.r_lr[i] = lr0 * r_0 + lr1 * r_1 + lr2 * r_2
-        loads.r_rr[i] = rr0 * r_0 + rr1 * r_1 + rr2 * r_2
-        slope = slope if counts else 0.0
-        rs = rs if counts else 0.0
-        # along the slice the pressure changes with its depth and with its rate
-        a0, b0, c0, e0 = bound_slopes(u0, t0, span, w0, p0, d_0 * slope + r_0 * rs)
-        a1, b1, c1, e1 = bound_slopes(u1, t1, span, w1, p1, d_1 * slope + r_1 * rs)
-        a2, b2, c2, e2 = bound_slopes(u2, t2, span, w2, p2, d_2 * slope + r_2 * rs)
-        loads.left_low[i] = a0 + a1 + a2
-        loads.right_low[i] = b0 + b1 + b2
-        loads.left_high[i] = c0 + c1 + c2
-        loads.right_high[i] = e0 + e1 + e2
-
-
-@kernel
-def clipped_slopes(strip, loads, n):
-    """Add to the derivatives by the gaps that a bound where the touch ends moves with them."""
-    gap = strip.gap
-    for i in range(n):
-        d0, d1 = -gap[i], -gap[i + 1]
-        slope = d1 - d0
-        at_low = loads.clip_low[i] != 0.0
-        at_high = loads.clip_high[i] != 0.0
-        left = loads.left_low[i] if at_low else loads.left_high[i]
-        right = loads.right_low[i] if at_low else loads.right_high[i]
-        # the touch ends at u = -d0 / (d1 - d0): du/dd0 = -d1 / slope^2, du/dd1 = d0 / slope^2, and d = -g
-        i_s2 = 1.0 / (slope * slope)
-        c0 = -d1 * i_s2 if (at_low or at_high) else 0.0
-        c1 = d0 * i_s2 if (at_low or at_high) else 0.0
-        k01 = loads.k_lr[i]
-        loads.k_ll[i] += left * c0
-        loads.k_lr[i] = k01 + left * c1
-        loads.k_rl[i] = k01 + right * c0
-        loads.k_rr[i] += right * c1
+    return on * p, on * p_d, on * p_r, on * w, on * e
 
 
 @summing

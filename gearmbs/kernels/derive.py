@@ -1,9 +1,9 @@
 """Values, derivatives and products of them from one definition of a law, written as kernels.
 
 A law is a plain Python function of numbers. Called with `Value` objects it is traced: each operation becomes a node of
-a graph in which no node is there twice, so that whatever intermediate results derivatives have in common is computed
-once. `derivative` adds nodes, `given` adds a number that somebody else computes together with its derivatives (a table,
-the solution of an iteration), and `Function.source` writes nodes as a kernel.
+a graph in which no node is there twice, so that what derivatives have in common is computed once. `derivative` adds
+nodes, `given` says how a number moves that somebody else computes, or that has a shorter rule than the chain's, and
+`Function.source` writes nodes as a kernel.
 
 A module ``definitions.py`` has a function ``functions()`` that returns `Function` objects; ``derived.py`` beside it is
 what they become, with the compiler's options ``COMPILED`` if it has any:
@@ -11,8 +11,7 @@ what they become, with the compiler's options ``COMPILED`` if it has any:
     python -m gearmbs.kernels.derive
 
 writes all such files anew. Behind a line stands what the definitions call its value, or of what by what it is the
-derivative. Of branches only `choose` is traced, with both sides computed: whether bodies touch at all
-is asked by whoever calls the kernel.
+derivative. Of branches only `choose` is traced, both sides computed: whether bodies touch is asked by whoever calls it.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from __future__ import annotations
 import functools
 import importlib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -235,16 +234,6 @@ class Value:
             yield from ((a, ONE), (b, ONE if kind == "+" else -ONE))
         elif kind == "*":
             yield from ((a, b), (b, a))
-        elif kind == "-x":
-            yield a, -ONE
-        elif kind == "1/x":
-            yield a, -(self * self)
-        elif kind == "sqrt":
-            yield a, 0.5 / self
-        elif kind == "sin":
-            yield a, a.cos()
-        elif kind == "cos":
-            yield a, -a.sin()
         elif kind == "norm":
             yield from ((operand, operand / self) for operand in self.operands)
         elif kind == "arctan2":
@@ -277,6 +266,11 @@ for _name in ("add", "sub", "mul", "truediv", "radd", "rsub", "rmul", "rtruediv"
     setattr(Value, f"__{_name}__", _beside_arrays(getattr(Value, f"__{_name}__")))
 
 ONE_OPERAND: dict[str, Any] = {
+    "-x": lambda x, f: -ONE,
+    "1/x": lambda x, f: -(f * f),
+    "sqrt": lambda x, f: 0.5 / f,
+    "sin": lambda x, f: x.cos(),
+    "cos": lambda x, f: -x.sin(),
     "tan": lambda x, f: 1.0 + f * f,
     "tanh": lambda x, f: 1.0 - f * f,
     "exp": lambda x, f: f,
@@ -402,7 +396,7 @@ def inputs(names: str, array: str = "", first: int | str = 0) -> list[Value]:
 
 
 def given(value: Value, partials: Mapping[Value, Any]) -> Value:
-    """Say what derivatives an argument, or a value, has by others; all else is taken for constant. Return it."""
+    """Say what derivatives a number has by others; all else is taken for constant. Return it."""
     value._partials = {by: value_of(slope) for by, slope in partials.items()}
     return value
 
@@ -412,15 +406,16 @@ def derivative(value: Value, by: Value) -> Value:
     if value is by:
         return ONE
     if (value, by) not in _slopes:
-        _slopes[value, by] = total = ZERO
-        if value.operation == "choose":
-            a, b, x, y = value.operands
-            _slopes[value, by] = choose(a, b, derivative(x, by), derivative(y, by))
-            return _slopes[value, by]
-        for operand, slope in value.partials():
-            total = total + slope * derivative(operand, by)
-        _slopes[value, by] = total
+        _slopes[value, by] = ZERO  # stands before those of its operands, which are named after it
+        _slopes[value, by] = _chained(value, lambda one: derivative(one, by))
     return _slopes[value, by]
+
+
+def _chained(value: Value, rate: Callable[[Value], Value]) -> Value:
+    """Return how a value moves, from how its operands do."""
+    if value.operation == "choose":
+        return choose(*value.operands[:2], *map(rate, value.operands[2:]))
+    return sum((slope * rate(one) for one, slope in value.partials()), ZERO)
 
 
 def slopes(value: Value, by: Iterable[Value]) -> list[Value]:
@@ -431,6 +426,17 @@ def slopes(value: Value, by: Iterable[Value]) -> list[Value]:
 def tangent(value: Value, rates: Mapping[Value, Any]) -> Value:
     """Return the derivative of a value along rates of what it is made of: by time, or by a parameter."""
     return product((derivative(value, by) for by in rates), map(value_of, rates.values()))
+
+
+def along(value: Value, rates: Mapping[Value, Any]) -> Value:
+    """Return what `tangent` does, from one pass: shorter where many numbers move."""
+    moved = {one: value_of(rate) for one, rate in rates.items()}
+
+    def rate(x: Value) -> Value:
+        moved[x] = moved[x] if x in moved else _chained(x, rate)
+        return moved[x]
+
+    return rate(value)
 
 
 def product(first: Iterable[Value], second: Iterable[Value]) -> Value:

@@ -97,7 +97,13 @@ class Section:
             self.alpha: rb * self.i_k * self.i_k, **{spin: base * self.i_w for spin, base in spins.items()},
             self.by_A: rb * E_A * self.i_w + s_w * self.A * i_w2, self.by_B: rb * E_B * self.i_w + s_w * self.B * i_w2,
         })  # fmt: skip
-        return involute_support(self.kap, s_w)
+        h, A, B = involute_support(self.kap, s_w), self.A, self.B
+        slope, i_k2 = self.i_k * (A * B * s_w + rb), self.i_k * self.i_k
+        # what the chain rule does not find: kappa / kappa^2 = 1 / kappa, and w^2 = 1 - A^2 - B^2
+        still = (self.by_A, self.by_B, *spins)
+        given(slope, {x: derivative(slope, x) for x in still}
+              | {self.alpha: (B * B * (self.w * self.w * i_k2) - A * A) * self.i_k * s_w})  # fmt: skip
+        return given(h, {x: derivative(h, x) for x in still} | {self.alpha: slope})
 
     def corner(self, eta: Value) -> Value:
         """Return h of a tip corner at the polar angle eta."""

@@ -1,0 +1,1 @@
+"""Forces of one slice of the face and of friction in one section, with all derivatives, from one statement."""
