@@ -266,7 +266,7 @@ for _name in ("add", "sub", "mul", "truediv", "radd", "rsub", "rmul", "rtruediv"
     setattr(Value, f"__{_name}__", _beside_arrays(getattr(Value, f"__{_name}__")))
 
 ONE_OPERAND: dict[str, Any] = {
-    "-x": lambda x, f: -ONE,
+    "-x": lambda x, f: _number(-1.0),
     "1/x": lambda x, f: -(f * f),
     "sqrt": lambda x, f: 0.5 / f,
     "sin": lambda x, f: x.cos(),
