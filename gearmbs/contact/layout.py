@@ -117,8 +117,9 @@ PAIR = record(
     "compliance_spacing",
     "secant",  # of the base helix angle: normal force over its part in the transverse section
     # reach of tip corners beyond the path of contact, see `search.teeth_in_reach`
-    "centre_distance",  # that of the drawing, m; the next four are for it
+    "centre_distance",  # that of the drawing, m; the next five are for it
     "corner_share",  # of the flatter parabola of a corner's gap at the path's ends that bounds the gap from below
+    "corner_bound",  # least ratio of a corner's gap to x^2 at x beyond the path of contact, 1/m
     "corner_reach",  # how far beyond the path a corner has a foot on the mate's involute, m
     "passing_gap",  # least gap with which a corner leaves the mate's tip, m
     "passing_slope",  # how much that falls at most with a change of the centre distance
@@ -133,6 +134,7 @@ PARALLEL = record(
     "cos",
     ("slack", 2),  # gap of the flanks of tooth 0 and one pair of the mate where nothing has turned; either side
     ("roll", 2),  # and the length of roll there on wheel 1
+    "per_pitch",  # 1 / base pitch, 1/m
     "curve",  # lower bound of the corner gap's growth beyond the path of contact, 1/m
     "shallow",  # depth up to which it bounds how far corners reach, m
     ("sense", 2),  # 1 or -1: how a wheel's own axis points

@@ -148,7 +148,8 @@ def _pack_reach(geometry: PairGeometry, reals: np.void) -> None:
     slopes = [abs(m.passing_gap - h.passing_gap) / step for h, m in zip(here, moved)]
     longer = max(abs(m.length - h.length) for h, m in zip(here, moved))
     reals["centre_distance"] = geometry.sign * geometry.centre_distance
-    share = min(r.bound for r in here) / min(r.curve for r in here)
+    reals["corner_bound"] = min(r.bound for r in here)
+    share = reals["corner_bound"] / min(r.curve for r in here)
     reals["corner_share"] = min(MOST_OF_PARABOLA, SHARE_KEPT * share)
     # other poses lengthen the reach a little; a pitch more costs nothing, since gaps decide
     reals["corner_reach"] = max(r.length for r in here) + longer + geometry.driver.base_pitch

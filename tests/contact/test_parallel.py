@@ -5,9 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 
+from gearmbs.contact import layout as L
 from gearmbs.contact.parallel import derived as D
-from gearmbs.contact.parallel.kernel import parallel_axes, parallel_contact
+from gearmbs.contact.parallel.kernel import corner_at, parallel_at, parallel_axes, parallel_contact
+from gearmbs.contact.records import pair_at
 from gearmbs.gears import ContactLaw, FlankFriction, GearPair, GearSpec
 from gearmbs.gears.faults import Eccentricity
 
@@ -195,3 +198,25 @@ def test_counts_of_references_are_behind_a_call_what_they_were_before():
         parallel_contact(ints, general.gr, both.own, np.zeros(4), 1, np.zeros(32), *handed[:3])
         general(both.start, 1)
     assert [sys.getrefcount(one) for one in handed] == before
+
+
+@njit
+def _corner(reals, own, first, roll_1, roll_2, contact):
+    corner_at(pair_at(reals), parallel_at(own), first, roll_1, roll_2, contact, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["paper", "+3 mm", "rounded tips", "few teeth"])
+def test_corners_are_left_out_by_a_bound_of_their_gaps(name):
+    both = Both(PAIRS[name], np.random.default_rng(2))
+    own, table = both.own.view(L.PARALLEL)[0], both.general.gr[: L.PAIR.itemsize // 8].view(L.PAIR)[0]
+    assert own["curve"] > 0.9 * table["corner_bound"]
+    contact = np.zeros(17)
+    for first, wheel in ((True, "wheel_1"), (False, "wheel_2")):
+        for gap in (-1e-8, -1e-5, -1e-4, -6e-4):
+            for over in np.geomspace(1e-5, table["corner_reach"] - table["pitch"], 100):
+                roll = table[wheel]["tip_roll"] + over
+                rolls = (roll, own["length"] - gap - roll)
+                _corner(both.general.gr, both.own, first, *(rolls if first else rolls[::-1]), contact)
+                if contact[0] - gap < own["shallow"]:
+                    assert contact[0] > gap + own["curve"] * over**2

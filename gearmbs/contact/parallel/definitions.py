@@ -47,13 +47,12 @@ def sliding(a, sin, normal, rate_1, rate_2):
     return -a * sin * rate_2 - normal * (rate_1 - rate_2)
 
 
-def planar_wrench(a, force, friction, by_a, by_1, by_2, sin, cos, normal):
-    """Return the force on wheel 1 along and across the line of centres, and the moment about its axis."""
-    return (
-        friction * cos - force * by_a,
-        force * (by_1 + by_2) / a - friction * sin,
-        force * by_1 - friction * normal,
-    )
+def planar_wrench(a, force, friction, moment, by_a, by_1, by_2, sin, cos):
+    """Return the force on wheel 1 along and across the line of centres, and the moment about its axis.
+
+    ``moment`` is that of friction, its product with the place along the normal.
+    """
+    return (friction * cos - force * by_a, force * (by_1 + by_2) / a - friction * sin, force * by_1 - moment)
 
 
 CONTACT = "gap by_a by_1 by_2 sin cos normal"
@@ -146,7 +145,8 @@ def forces() -> list[Function]:
     given(force, {gap: -stiffness, approach: -damping})
     # the ratio depends on the size of the speed; its slope is over that
     given(ratio, {speed: ratio_slope * speed})
-    wrench = planar_wrench(a, force, -(ratio * force * speed), by_a, by_1, by_2, sin, cos, normal)
+    friction = -(ratio * force * speed)
+    wrench = planar_wrench(a, force, friction, friction * normal, by_a, by_1, by_2, sin, cos)
     sums = [derivative(row, x) for row in wrench for x in (phi_1, phi_2, rate_1, rate_2)]
     return [
         Function(
@@ -166,6 +166,20 @@ def forces() -> list[Function]:
     ]  # fmt: skip
 
 
+def flanks() -> list[Function]:
+    """Return the kernels of all flanks of a side together: they differ in their places along the normal alone."""
+    a, sin, cos, base_1, base_2, place = inputs("a sin cos base_1 base_2 place")
+    force, friction, moment, rate_1, rate_2 = inputs("force friction moment rate_1 rate_2")
+    wrench = planar_wrench(a, force, friction, moment, sin, -base_1, -base_2, sin, cos)
+    return [
+        Function("flank_sliding", "a, sin, place, rate_1, rate_2", "Return the sliding velocity of flanks.",
+                 [sliding(a, sin, place, rate_1, rate_2)]),
+        Function("flank_wrench", "a, sin, cos, base_1, base_2, force, friction, moment, sums",
+                 "Add the wrench of flanks: sums of force, friction, and friction times place.",
+                 adds=numbered("sums", wrench)),
+    ]  # fmt: skip
+
+
 def turn(angle: Value, sin: Value, cos: Value) -> None:
     """Say of what angle two numbers are sine and cosine."""
     given(sin, {angle: cos})
@@ -177,4 +191,4 @@ def numbered(array: str, values, first: int = 0) -> dict[str, Value]:
 
 
 def functions() -> list[Function]:
-    return [*corner(True), *corner(False), *corner_on_plane(True), *corner_on_plane(False), *forces()]
+    return [*corner(True), *corner(False), *corner_on_plane(True), *corner_on_plane(False), *forces(), *flanks()]

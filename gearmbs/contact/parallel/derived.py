@@ -331,3 +331,17 @@ def contact_slopes(a, force, stiffness, damping, ratio, ratio_slope, rate_1, rat
     sums[12] += force * by_1_2 - (by_1 * _12) - (normal_2 * _9 + normal * _13)
     sums[13] -= by_1 * _14 + normal * _15
     sums[14] -= by_1 * _17 + normal * _18
+
+
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
+def flank_sliding(a, sin, place, rate_1, rate_2):
+    """Return the sliding velocity of flanks."""
+    return -(rate_2 * (a * sin) + place * (rate_1 - rate_2))
+
+
+@njit(cache=True, straight=True, error_model="numpy", forceinline=True)
+def flank_wrench(a, sin, cos, base_1, base_2, force, friction, moment, sums):
+    """Add the wrench of flanks: sums of force, friction, and friction times place."""
+    sums[0] += cos * friction - (sin * force)
+    sums[1] -= (force * (base_1 + base_2)) * (1.0 / a) + sin * friction
+    sums[2] -= moment + base_1 * force

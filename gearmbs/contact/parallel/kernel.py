@@ -29,6 +29,10 @@ from gearmbs.kernels.views import header
 
 PARALLEL = 1e-12
 """Tilt of two axes, and distance of a wheel's middle from its axis, m, that are rounding."""
+DRAWN = 1e-6
+"""Part of the centre distance by which it may be off for the drawing's bound of corner gaps, which it moves as much."""
+DEEP = 0.98
+"""Part of that bound, which is for flanks that touch: at depths up to 0.6 mm gaps are above 0.998 of it."""
 CONTACT, SUMS = 17, 15
 """Numbers of a contact with its derivatives, and of the sums: planar wrench, its derivatives by angles and rates."""
 parallel_at = header(L.PARALLEL)
@@ -72,10 +76,11 @@ def corner_at(wheels, own, first, roll_1, roll_2, contact, want):
 
 
 @inlined
-def flanks_at(wheels, own, gap, contact):
-    """Write the contact of flanks, all but the place along the normal."""
+def flanks_at(wheels, own, gap, place, contact):
+    """Write the contact of flanks at a place along the normal."""
     rb1, rb2 = wheels.wheel_1.base_radius, wheels.wheel_2.base_radius
     contact[0], contact[1], contact[2], contact[3], contact[4], contact[5] = gap, own.sin, -rb1, -rb2, own.sin, own.cos
+    contact[6] = place
     for k in range(7, 15):
         contact[k] = 0.0
     contact[15], contact[16] = 0.5 * rb1, -0.5 * rb2
@@ -91,33 +96,48 @@ def press(options, wheels, depth, approach):
 
 
 @inlined
-def tell(options, diagnostics, sign, depth, approach, law):
-    """Add to the diagnostics what a touching pair presses."""
+def tell(options, diagnostics, sign, depth, approach, law, count):
+    """Add to the diagnostics what some touching pairs press."""
     force, _, _, energy, elastic = law
-    diagnostics[0] += energy
-    diagnostics[1] += (force - elastic) * approach
+    diagnostics[0] += count * energy
+    diagnostics[1] += count * ((force - elastic) * approach)
     at = 0 if sign == options.drive else 1
     diagnostics[3 + at] = max(diagnostics[3 + at], depth)
-    diagnostics[5 + at] += 1.0
-    diagnostics[7] += force
+    diagnostics[5 + at] += count
+    diagnostics[7] += count * force
 
 
 @inlined
-def add_contact(options, wheels, own, law, rates, contact, sums, diagnostics, want):
-    """Add the wrench of a contact and its friction to the sums."""
+def friction_at(options, wheels, speed):
+    """Return the friction coefficient over the sliding speed, and what `friction_law` says of its slope."""
+    return friction_law(
+        options.friction, wheels.static_friction, wheels.dynamic_friction, wheels.static_speed, wheels.dynamic_speed,
+        abs(speed),
+    )  # fmt: skip
+
+
+@inlined
+def add_slopes(own, law, ratio, ratio_slope, rates, contact, sums):
+    """Add the derivatives of the wrench of a contact to the sums."""
     force, stiffness, damping, _, _ = law
-    a, rate_1, rate_2 = own.distance, rates[0], rates[1]
+    rate_1, rate_2 = rates
+    D.contact_slopes(own.distance, force, stiffness, damping, ratio, ratio_slope, rate_1, rate_2, contact, sums)
+
+
+@inlined
+def add_corner(options, wheels, own, sign, rates, contact, sums, diagnostics, want):
+    """Add the wrench of a tip corner and its friction to the sums, and what it presses to the diagnostics."""
+    (rate_1, rate_2), depth = rates, -contact[0]
+    away, speed = D.contact_rates(own.distance, rate_1, rate_2, contact)
+    law = press(options, wheels, depth, -away)
+    tell(options, diagnostics, sign, depth, -away, law, 1.0)
     ratio = ratio_slope = 0.0
     if options.friction != L.FRICTION_NONE:
-        _, speed = D.contact_rates(a, rate_1, rate_2, contact)
-        ratio, ratio_slope = friction_law(
-            options.friction, wheels.static_friction, wheels.dynamic_friction, wheels.static_speed,
-            wheels.dynamic_speed, abs(speed),
-        )  # fmt: skip
-        diagnostics[2] += ratio * force * speed * speed
-    D.contact_wrench(a, force, ratio, rate_1, rate_2, contact, sums)
+        ratio, ratio_slope = friction_at(options, wheels, speed)
+        diagnostics[2] += ratio * law[0] * speed * speed
+    D.contact_wrench(own.distance, law[0], ratio, rate_1, rate_2, contact, sums)
     if want != 0:
-        D.contact_slopes(a, force, stiffness, damping, ratio, ratio_slope, rate_1, rate_2, contact, sums)
+        add_slopes(own, law, ratio, ratio_slope, rates, contact, sums)
 
 
 @kernel
@@ -147,28 +167,36 @@ def side_forces(options, wheels, own, sign, roll, gap, rates, contact, sums, dia
         curve = own.curve
         beyond = min(beyond, np.sqrt(depth / curve))
     law = press(options, wheels, depth, approach)
-    first = int(np.ceil((own.length - tip_2 - beyond - roll) / pitch))
-    last = int(np.floor((tip_1 + beyond - roll) / pitch))
+    first = int(np.ceil((own.length - tip_2 - beyond - roll) * own.per_pitch))
+    last = int(np.floor((tip_1 + beyond - roll) * own.per_pitch))
+    pairs = friction = moment = 0.0
     for i in range(first, last + 1):
         roll_1 = roll + i * pitch
         roll_2 = whole - roll_1
         over_1, over_2 = roll_1 - tip_1, roll_2 - tip_2
         over = max(over_1, over_2)
-        if over <= 0.0:
-            flanks_at(wheels, own, gap, contact)
-            contact[6] = roll_1 + 0.5 * gap
-            tell(options, diagnostics, sign, depth, approach, law)
-            add_contact(options, wheels, own, law, rates, contact, sums, diagnostics, want)
+        if over > 0.0:
+            if gap + curve * over * over < 0.0:
+                corner_at(wheels, own, over_1 > over_2, roll_1, roll_2, contact, want)
+                if contact[0] < 0.0:
+                    add_corner(options, wheels, own, sign, rates, contact, sums, diagnostics, want)
             continue
-        if gap + curve * over * over >= 0.0:
-            continue
-        corner_at(wheels, own, over_1 > over_2, roll_1, roll_2, contact, want)
-        if contact[0] >= 0.0:
-            continue
-        away, _ = D.contact_rates(own.distance, rates[0], rates[1], contact)
-        own_law = press(options, wheels, -contact[0], -away)
-        tell(options, diagnostics, sign, -contact[0], -away, own_law)
-        add_contact(options, wheels, own, own_law, rates, contact, sums, diagnostics, want)
+        # flanks differ in their places along the normal alone, and with these in their friction
+        pairs += 1.0
+        place, ratio, ratio_slope = roll_1 + 0.5 * gap, 0.0, 0.0
+        if options.friction != L.FRICTION_NONE:
+            speed = D.flank_sliding(own.distance, own.sin, place, rates[0], rates[1])
+            ratio, ratio_slope = friction_at(options, wheels, speed)
+            pull = ratio * law[0] * speed
+            friction -= pull
+            moment -= pull * place
+            diagnostics[2] += pull * speed
+        if want != 0:
+            flanks_at(wheels, own, gap, place, contact)
+            add_slopes(own, law, ratio, ratio_slope, rates, contact, sums)
+    if pairs > 0.0:
+        tell(options, diagnostics, sign, depth, approach, law, pairs)
+        D.flank_wrench(own.distance, own.sin, own.cos, rb1, rb2, pairs * law[0], friction, moment, sums)
 
 
 @njit(TURNING_SIG, cache=True, nogil=True, error_model="numpy")
@@ -201,7 +229,7 @@ def parallel_contact(ints, reals, own, turns, want, work, wrench, slopes, diagno
     for k in range(SUMS):
         sums[k] = 0.0
     slack = fixed.slack[1] + turned
-    gap = slack - pitch * np.floor(slack / pitch + 0.5)
+    gap = slack - pitch * np.floor(slack * fixed.per_pitch + 0.5)
     if gap < 0.0:
         roll = fixed.roll[1] - turned_1
         side_forces(
@@ -213,7 +241,7 @@ def parallel_contact(ints, reals, own, turns, want, work, wrench, slopes, diagno
         for k in range(3, 7):
             sums[k] = -sums[k]
     slack = fixed.slack[0] - turned
-    gap = slack - pitch * np.floor(slack / pitch + 0.5)
+    gap = slack - pitch * np.floor(slack * fixed.per_pitch + 0.5)
     if gap < 0.0:
         roll = fixed.roll[0] + turned_1
         side_forces(options, wheels, fixed, 1, roll, gap, (rate_1, rate_2), contact, sums, diagnostics, derivatives)
@@ -272,11 +300,10 @@ def parallel_axes(gi: np.ndarray, gr: np.ndarray, frames: np.ndarray, axes: np.n
         starts = [sign * spin + wheel["half_angle"] for spin, wheel in zip(spins, (one, two))]
         slack = length - base * alpha - one["base_radius"] * starts[0] - two["base_radius"] * starts[1]
         own["slack"][side], own["roll"][side] = slack, one["base_radius"] * (starts[0] + alpha)
-    growth = (
-        corner_growth.py_func(length, one["tip_roll"], one["base_radius"]),
-        corner_growth.py_func(length, two["tip_roll"], two["base_radius"]),
-    )
-    own["curve"] = wheels["corner_share"] * min(growth)
+    own["curve"], own["per_pitch"] = DEEP * wheels["corner_bound"], 1.0 / wheels["pitch"]
+    if abs(a - wheels["centre_distance"]) > DRAWN * a:
+        growth = [corner_growth.py_func(length, w["tip_roll"], w["base_radius"]) for w in (one, two)]
+        own["curve"] = wheels["corner_share"] * min(growth)
     own["shallow"] = wheels["passing_gap"] - wheels["passing_slope"] * abs(a - wheels["centre_distance"])
     own["sense"] = [np.sign(n @ z) for n in axes[:, 1]]
     own["frame"] = np.column_stack([x, y, z])
