@@ -250,7 +250,7 @@ TOOTH_PAIR = record(
     ("stiffness_factor_xx", 6, 6),
     ("moved", 6),  # derivative of the elastic energy by the pose as the centroid moves along the face
 )
-LIMIT = record("value", ("grad", 6), ("hess", 6, 6))
+LIMIT = record(("grad", 6), ("hess", 6, 6))
 SUMS = record(
     ("q", 6),  # generalised normal force
     ("f", 6),  # friction wrench on wheel 1
@@ -340,8 +340,6 @@ SCRATCH = record(
     ("totals", TOTALS),
     ("low", LIMIT),  # limits of the common face
     ("high", LIMIT),
-    ("end_1", LIMIT),  # end faces of the two wheels
-    ("end_2", LIMIT),
     ("lookup_1", LOOKUP),
     ("lookup_2", LOOKUP),
     ("corner_1", CORNER),

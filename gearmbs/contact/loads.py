@@ -95,7 +95,7 @@ def face_end(wheels, scratch, law, strip, i, u, end, share, want):
     side, pair, loads = scratch.side, scratch.pair, scratch.loads
     limit = scratch.low if end < 0.0 else scratch.high
     roll = end_roll(side, wheels, end, pair.roll)
-    limit_slopes(side, wheels, end, roll, limit, scratch.end_1, scratch.end_2, want)
+    limit_slopes(side, wheels, end, roll, limit, want)
     end_force(law, strip, i, side.step, u, end * share, limit, pair, scratch.sums, want)
     clipped = loads.clip_low[i] if end < 0.0 else loads.clip_high[i]
     if want != 0 and clipped == 0.0:

@@ -549,8 +549,8 @@ def centroid_contact(options, wheels, scratch, law, totals, want):
             copy_rows(flanks, own, L.LANES, want)
     if want != 0:
         low, high = end_roll(side, wheels, -1.0, pair.roll), end_roll(side, wheels, 1.0, pair.roll)
-        limit_slopes(side, wheels, -1.0, low, scratch.low, scratch.end_1, scratch.end_2, 0)
-        limit_slopes(side, wheels, 1.0, high, scratch.high, scratch.end_1, scratch.end_2, 0)
+        limit_slopes(side, wheels, -1.0, low, scratch.low, 0)
+        limit_slopes(side, wheels, 1.0, high, scratch.high, 0)
     k, depth = centroid_force(options, wheels, scratch, law, own_strips, totals, want)
     if depth > 0.0:
         # the corners at work are those of the last strip: find those of the strip that bears the force again

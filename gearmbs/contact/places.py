@@ -31,89 +31,28 @@ def end_roll(side, wheels, end, roll):
 
 
 @inlined
-def half_width(wheel, end):
-    """Half the face width of a wheel towards an end, +1 or -1."""
-    return end * 0.5 * wheel.face_width
-
-
-@kernel
-def end_value(side, wheel, k, end, sig):
-    """Limit set by one wheel's end face, from the transverse contact point at the length of roll ``sig``.
-
-    ``k`` is 0 for wheel 1 and 1 for wheel 2, ``end`` is +1 or -1.
-    """
-    x, sign, other, width = side.x, 1.0 - 2.0 * k, float(k), half_width(wheel, end)
-    return D.end_value(
-        x[L.A], x[L.H], x[L.P], x[L.Q], side.base_1, side.sin_0, side.cos_0, sig, side.i_w, width, sign, other
-    )
-
-
-@kernel
-def end_slopes(side, wheel, k, end, sig, limit, want):
-    """Fill the limit of `end_value` with its gradient and, if wanted, the upper half of its Hessian by the pose."""
-    limit.value = end_value(side, wheel, k, end, sig)
-    x, sign, other, width = side.x, 1.0 - 2.0 * k, float(k), half_width(wheel, end)
-    D.end_slopes(
-        x[L.A], x[L.H], x[L.P], x[L.Q], side.base_1, side.sin_0, side.cos_0, sig, side.i_w, width, sign, other,
-        side.base_2, side.base_sum, side.base_difference, side.length, side.i_w3, limit.grad,
+def end_numbers(side, wheels, end, sig):
+    """Return what an end of the face follows from, +1 or -1, at the length of roll of the transverse contact point."""
+    half_1, half_2 = end * 0.5 * wheels.wheel_1.face_width, end * 0.5 * wheels.wheel_2.face_width
+    return (
+        side.x[L.A], side.x[L.H], side.x[L.P], side.x[L.Q], side.base_1, side.sin_0, side.cos_0, sig, side.i_w,
+        half_1, half_2, end, wheels.end_blend,
     )  # fmt: skip
-    if want != 0:
-        D.end_curves(
-            x[L.A], x[L.H], x[L.P], x[L.Q], side.base_1, side.sin_0, side.cos_0, sig, side.i_w, width, sign, other,
-            side.base_2, side.base_sum, side.base_difference, side.length, side.i_w3, side.i_w5, limit.hess,
-        )  # fmt: skip
 
 
 @kernel
 def limit_value(side, wheels, end, sig):
     """Limit of the common face towards ``end``: the nearer end face of the two wheels, blended where they tie."""
-    # the smaller of two at the upper end, the larger at the lower one: (u + v -+ |u - v|)/2, |d| as sqrt(d^2 + blend^2)
-    u = end_value(side, wheels.wheel_1, 0, end, sig)
-    v = end_value(side, wheels.wheel_2, 1, end, sig)
-    blend = wheels.end_blend
-    return 0.5 * (u + v - end * np.sqrt((u - v) * (u - v) + blend * blend))
+    return D.end_value(*end_numbers(side, wheels, end, sig))
 
 
 @kernel
-def limit_slopes(side, wheels, end, sig, limit, one, two, want):
-    """Fill the limit of `limit_value` with its gradient and, if wanted, its Hessian.
-
-    Parameters
-    ----------
-    side, wheels : record
-    end : float
-        -1 at the lower end, +1 at the higher.
-    sig : float
-        Length of roll on wheel 1 at the transverse contact point.
-    limit : record
-        Out.
-    one, two : record
-        Scratch.
-    want : int
-        Nonzero to fill the Hessian.
-    """
-    end_slopes(side, wheels.wheel_1, 0, end, sig, one, want)
-    end_slopes(side, wheels.wheel_2, 1, end, sig, two, want)
-    blend = wheels.end_blend
-    u, v = one.value, two.value
-    d = u - v
-    r = np.sqrt(d * d + blend * blend)
-    limit.value = 0.5 * (u + v - end * r)
-    # slopes of that by u and v, and its second derivative by u - v
-    wu = 0.5 * (1.0 - end * d / r)
-    wv = 1.0 - wu
-    for i in range(6):
-        limit.grad[i] = wu * one.grad[i] + wv * two.grad[i]
-    if want == 0:
-        return
-    curve = -0.5 * end * blend * blend / (r * r * r)
-    for i in range(6):
-        di = one.grad[i] - two.grad[i]
-        for j in range(i, 6):
-            dj = one.grad[j] - two.grad[j]
-            value = wu * one.hess[i, j] + wv * two.hess[i, j] + curve * di * dj
-            limit.hess[i, j] = value
-            limit.hess[j, i] = value
+def limit_slopes(side, wheels, end, sig, limit, want):
+    """Fill the gradient of the limit of `limit_value` and, if wanted, its Hessian."""
+    more = side.base_2, side.base_sum, side.base_difference, side.length, side.i_w3
+    D.end_slopes(*end_numbers(side, wheels, end, sig), *more, limit.grad)
+    if want != 0:
+        D.end_curves(*end_numbers(side, wheels, end, sig), *more, side.i_w5, limit.hess)
 
 
 # The one section at mid-face of spur wheels whose axes are parallel but for rounding: values in closed form.

@@ -68,8 +68,8 @@ def test_the_wrench_does_the_work_of_the_force_and_has_exact_derivatives():
         compared(found[:, k], stepped(wrench, X[:4], k))
 
 
-def end(k, one, two):
-    """Return the limit by an end face of wheel k as a function of the pose, by angles instead of rules."""
+def end(one, two, towards, blend):
+    """Return the limit of the common face as a function of the pose, by angles instead of rules."""
 
     def limit(a, h, p, q, f1, f2):
         length = np.sqrt(a * a - (one + two) ** 2)
@@ -77,26 +77,32 @@ def end(k, one, two):
         sine, cos = np.sin(alpha), np.cos(alpha)
         roll = 0.5 * (one * f1 - two * f2 + (one - two) * alpha + length)
         x, y = one * cos + roll * sine, roll * cos - one * sine
-        sign = 1.0 - 2.0 * k
-        across = 0.01 - sign * (p * x + q * y) - k * p * a
-        return across / np.sqrt(1.0 - p * p - q * q) - sign * 0.5 * h
+        w = np.sqrt(1.0 - p * p - q * q)
+        ends = [
+            (towards * width - sign * (p * x + q * y) - k * p * a) / w - sign * 0.5 * h
+            for k, (sign, width) in enumerate(((1.0, 0.0100), (-1.0, 0.0103)))
+        ]
+        apart = ends[0] - ends[1]
+        return 0.5 * (ends[0] + ends[1] - towards * np.sqrt(apart * apart + blend * blend))
 
     return limit
 
 
-@pytest.mark.parametrize("k", [0, 1])
-def test_ends_of_the_face_have_exact_derivatives(k):
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+@pytest.mark.parametrize("blend", [1e-5, 2e-3])
+def test_ends_of_the_face_have_exact_derivatives(towards, blend):
     one, two = 0.0402, 0.0476
     numbers = a, h, p, q, f1, f2 = [*X[:4], 0.3, -0.4]
-    exact = end(k, one, two)(*jets(numbers))
+    exact = end(one, two, towards, blend)(*jets(numbers))
     alpha, i_w = np.arccos((one + two) / a), 1.0 / cosine(X)
     length = a * np.sin(alpha)
     sig = 0.5 * (one * f1 - two * f2 + (one - two) * alpha + length)
-    first = (a, h, p, q, one, np.sin(alpha), np.cos(alpha), sig, i_w, 0.01, 1.0 - 2.0 * k, float(k))
+    widths = (towards * 0.0100, towards * 0.0103)
+    first = (a, h, p, q, one, np.sin(alpha), np.cos(alpha), sig, i_w, *widths, towards, blend)
     more = (two, one + two, one - two, length, i_w**3)
     grad, hess = np.zeros(6), np.zeros((6, 6))
     D.end_slopes.py_func(*first, *more, grad)
     D.end_curves.py_func(*first, *more, i_w**5, hess)
     assert D.end_value.py_func(*first) == pytest.approx(exact.value, rel=1e-13)
     compared(grad, exact.gradient)
-    compared(hess + np.triu(hess, 1).T, exact.hessian)
+    compared(hess, exact.hessian)

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from gearmbs.kernels.derive import (
     ONE,
     Function,
@@ -76,19 +78,24 @@ def matrix(name: str, values: Sequence[Vector]) -> dict[str, Value]:
 def end_of_face(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other):
     """Return where an end face cuts the path of contact along the mean axis.
 
-    ``width`` is half the width towards the end, ``sign`` 1 for wheel 1 and -1 for wheel 2, whose axis stands at a:
-    ``other`` is 1.
+    ``width`` is half the width towards the end, with its sign, ``sign`` 1 for wheel 1 and -1 for wheel 2, whose axis
+    stands at a: ``other`` is 1.
     """
     x, y = base * ca + sig * sa, sig * ca - base * sa
     return (width - sign * (p * x + q * y) - other * (p * a)) * i_w - 0.5 * (sign * h)
 
 
 def ends() -> list[Function]:
-    """cos alpha_0 = r_b/a, length^2 = a^2 - r_b^2, roll sig = (r_b1 f1 - r_b2 f2 + d alpha_0 + length)/2."""
+    """Return the kernels of an end of the common face: the nearer end of two, blended where they tie.
+
+    The smaller of two limits at the upper end, where ``end`` is 1, the larger at the lower: (u + v -+ |u - v|) / 2, and
+    |d| is sqrt(d^2 + blend^2). cos alpha_0 = r_b/a, length^2 = a^2 - r_b^2, roll sig = (r_b1 f1 - r_b2 f2 + d alpha_0 +
+    length)/2.
+    """
     a, h, p, q = inputs("a h p q")
-    f1, f2 = inputs("f1 f2")
+    f1, f2 = inputs("_f1 _f2")
     base, mate, total, difference, length = inputs("base mate total difference length")
-    sa, ca, sig, i_w, width, sign, other = inputs("sa ca sig i_w width sign other")
+    sa, ca, sig, i_w, width_1, width_2, end, blend = inputs("sa ca sig i_w width_1 width_2 end blend")
     i_w3, i_w5 = inputs("i_w3 i_w5")
     turned = total / (a * length)
     given(length, {a: a / length})
@@ -98,16 +105,25 @@ def ends() -> list[Function]:
     given(i_w3, {p: 3.0 * (p * i_w5), q: 3.0 * (q * i_w5)})
     given(sig, {a: 0.5 * (difference * turned + a / length), f1: 0.5 * base, f2: -0.5 * mate})
     by = (a, h, p, q, f1, f2)
-    limit = end_of_face(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other)
+    u, v = (end_of_face(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other)
+            for width, sign, other in ((width_1, 1.0, 0.0), (width_2, -1.0, 1.0)))  # fmt: skip
+    apart = u - v
+    size = np.sqrt(apart * apart + blend * blend)
+    i_size = 1.0 / size
+    share = apart * i_size
+    bend = blend * blend * i_size * i_size * i_size
+    given(size, {x: share * derivative(apart, x) for x in by})
+    given(share, {x: bend * derivative(apart, x) for x in by})
+    limit = 0.5 * (u + v - end * size)
     first = slopes(limit, by)
-    second = [[derivative(one, x) for x in by] for one in first]
-    numbers = "a, h, p, q, base, sa, ca, sig, i_w, width, sign, other"
+    half = {(i, k): derivative(first[i], by[k]) for i in range(6) for k in range(i, 6)}
+    second = [[half[min(i, k), max(i, k)] for k in range(6)] for i in range(6)]
+    numbers = "a, h, p, q, base, sa, ca, sig, i_w, width_1, width_2, end, blend"
     more = f"{numbers}, mate, total, difference, length, i_w3"
-    halves = {f"hess[{i}, {k}]": second[i][k] for i in range(6) for k in range(i, 6)}
     return [
-        Function("end_value", numbers, "Return where an end face cuts the path of contact.", [limit]),
+        Function("end_value", numbers, "Return where the common face ends.", [limit]),
         Function("end_slopes", f"{more}, grad", "Write its gradient by the pose.", sets=vector("grad", first)),
-        Function("end_curves", f"{more}, i_w5, hess", "Write the upper half of its Hessian.", sets=halves),
+        Function("end_curves", f"{more}, i_w5, hess", "Write its Hessian.", sets=matrix("hess", second)),
     ]
 
 

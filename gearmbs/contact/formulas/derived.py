@@ -265,92 +265,170 @@ def pose_columns(x, w, columns, turn):
 
 
 @njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
-def end_value(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other):
-    """Return where an end face cuts the path of contact."""
-    _0 = i_w * (width - (sign * (p * (base * ca + sa * sig) + q * (ca * sig - (base * sa)))) - (other * (a * p))) - (0.5 * (h * sign))  # limit
-    return _0
+def end_value(a, h, p, q, base, sa, ca, sig, i_w, width_1, width_2, end, blend):
+    """Return where the common face ends."""
+    _0 = p * (base * ca + sa * sig) + q * (ca * sig - (base * sa))
+    _1 = 0.5 * h
+    _2 = i_w * (width_1 - _0) - _1  # u
+    _3 = _1 + i_w * (width_2 + _0 - (a * p))  # v
+    _4 = _2 - _3  # apart
+    return 0.5 * (_2 + _3 - (end * np.sqrt(_4 * _4 + blend * blend)))
 
 
 @njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
-def end_slopes(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other, mate, total, difference, length, i_w3, grad):
+def end_slopes(a, h, p, q, base, sa, ca, sig, i_w, width_1, width_2, end, blend, mate, total, difference, length, i_w3, grad):
     """Write its gradient by the pose."""
     _0 = total * (1.0 / (a * length))  # turned
     _1 = ca * _0  # d sa / d a
     _2 = a * (1.0 / length) + difference * _0
     _3 = sa * _0
-    _4 = sign * (p * (sig * _1 + 0.5 * (sa * _2) - (base * _3)) + q * (0.5 * (ca * _2) - (sig * _3) - (base * _1))) + p * other
-    _5 = base * ca
-    _6 = _5 + sa * sig  # x
-    _7 = base * sa
-    _8 = ca * sig - _7  # y
-    _9 = width - (sign * (p * _6 + q * _8)) - (other * (a * p))
-    grad[0] = -(i_w * _4)
-    grad[1] = -(0.5 * sign)
-    grad[2] = p * i_w3 * _9 - (i_w * (sign * _6 + a * other))
-    grad[3] = q * i_w3 * _9 - (i_w * (sign * _8))
-    grad[4] = -(i_w * (sign * (0.5 * (p * _7) + 0.5 * (q * _5))))
-    grad[5] = i_w * (sign * (0.5 * (p * (mate * sa)) + 0.5 * (q * (mate * ca))))
+    _4 = p * (sig * _1 + 0.5 * (sa * _2) - (base * _3)) + q * (0.5 * (ca * _2) - (sig * _3) - (base * _1))
+    _5 = i_w * (_4 - p)  # d v / d a
+    _6 = i_w * _4
+    _7 = base * ca
+    _8 = _7 + sa * sig  # x
+    _9 = base * sa
+    _10 = ca * sig - _9  # y
+    _11 = p * _8 + q * _10
+    _12 = width_1 - _11
+    _13 = 0.5 * h
+    _14 = width_2 + _11 - (a * p)
+    _15 = i_w * _12 - _13 - (_13 + i_w * _14)  # apart
+    _16 = _15 * (1.0 / np.sqrt(_15 * _15 + blend * blend))  # share
+    _17 = p * i_w3  # d i_w / d p
+    _18 = _17 * _12 - (i_w * _8)  # d u / d p
+    _19 = _17 * _14 + i_w * (_8 - a)  # d v / d p
+    _20 = q * i_w3  # d i_w / d q
+    _21 = i_w * _10
+    _22 = _20 * _12 - _21  # d u / d q
+    _23 = _21 + _20 * _14  # d v / d q
+    grad[0] = 0.5 * (_5 - _6 + end * (_16 * (_6 + _5)))
+    grad[1] = 0.5 * (end * _16)
+    grad[2] = 0.5 * (_18 + _19 - (end * (_16 * (_18 - _19))))
+    grad[3] = 0.5 * (_22 + _23 - (end * (_16 * (_22 - _23))))
+    grad[4] = end * (_16 * (i_w * (0.5 * (p * _9) + 0.5 * (q * _7))))
+    grad[5] = -(end * (_16 * (i_w * (0.5 * (p * (mate * sa)) + 0.5 * (q * (mate * ca))))))
 
 
 @njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
-def end_curves(a, h, p, q, base, sa, ca, sig, i_w, width, sign, other, mate, total, difference, length, i_w3, i_w5, hess):
-    """Write the upper half of its Hessian."""
-    _0 = 1.0 / (a * length)
-    _1 = total * _0  # turned
-    _2 = ca * _1  # d sa / d a
-    _3 = 1.0 / length
-    _4 = a * _3  # d length / d a
-    _5 = _4 + difference * _1
-    _6 = _2 * _5
-    _7 = sa * _1
-    _8 = total * (_0 * _0 * (length + a * _4))
-    _9 = _1 * _7 + ca * _8
-    _10 = _3 - (a * (_4 * (_3 * _3))) - (difference * _8)
-    _11 = _1 * _2 - (sa * _8)
-    _12 = _7 * _5
-    _13 = p * (0.5 * _6 - (sig * _9) + 0.5 * (_6 + sa * _10) - (base * _11)) + q * (0.5 * (ca * _10 - _12) - (0.5 * _12 + sig * _11) + base * _9)
-    _14 = p * i_w3  # d i_w / d p
-    _15 = base * _7
-    _16 = sig * _2 + 0.5 * (sa * _5) - _15  # d x / d a
-    _17 = base * _2
-    _18 = 0.5 * (ca * _5) - (sig * _7) - _17  # d y / d a
-    _19 = sign * (p * _16 + q * _18) + p * other
-    _20 = q * i_w3  # d i_w / d q
-    _21 = base * ca
-    _22 = _21 + sa * sig  # x
-    _23 = base * sa
-    _24 = ca * sig - _23  # y
-    _25 = width - (sign * (p * _22 + q * _24)) - (other * (a * p))
-    _26 = sign * _22 + a * other
-    _27 = _14 * _26
-    _28 = q * i_w5
-    _29 = sign * _24
-    _30 = sign * (0.5 * (p * _23) + 0.5 * (q * _21))
-    _31 = mate * sa
-    _32 = mate * ca
-    _33 = sign * (0.5 * (p * _31) + 0.5 * (q * _32))
-    _34 = _20 * _29
-    hess[0, 0] = -(i_w * (sign * _13))
-    hess[0, 1] = 0.0
-    hess[0, 2] = -(_14 * _19 + i_w * (other + sign * _16))
-    hess[0, 3] = -(_20 * _19 + i_w * (sign * _18))
-    hess[0, 4] = -(i_w * (sign * (0.5 * (p * _17) - (0.5 * (q * _15)))))
-    hess[0, 5] = -(i_w * (sign * (0.5 * (q * (mate * _7)) - (0.5 * (p * (mate * _2))))))
-    hess[1, 1] = 0.0
-    hess[1, 2] = 0.0
-    hess[1, 3] = 0.0
-    hess[1, 4] = 0.0
-    hess[1, 5] = 0.0
-    hess[2, 2] = _25 * (i_w3 + 3.0 * (p * (p * i_w5))) - _27 - _27
-    hess[2, 3] = 3.0 * (_25 * (p * _28)) - (_14 * _29) - (_20 * _26)
-    hess[2, 4] = -(_14 * _30 + 0.5 * (i_w * (sign * _23)))
-    hess[2, 5] = _14 * _33 + 0.5 * (i_w * (sign * _31))
-    hess[3, 3] = _25 * (i_w3 + 3.0 * (q * _28)) - _34 - _34
-    hess[3, 4] = -(_20 * _30 + 0.5 * (i_w * (sign * _21)))
-    hess[3, 5] = _20 * _33 + 0.5 * (i_w * (sign * _32))
-    hess[4, 4] = 0.0
-    hess[4, 5] = 0.0
-    hess[5, 5] = 0.0
+def end_curves(a, h, p, q, base, sa, ca, sig, i_w, width_1, width_2, end, blend, mate, total, difference, length, i_w3, i_w5, hess):
+    """Write its Hessian."""
+    _0 = base * ca
+    _1 = _0 + sa * sig  # x
+    _2 = base * sa
+    _3 = ca * sig - _2  # y
+    _4 = p * _1 + q * _3
+    _5 = width_1 - _4
+    _6 = 0.5 * h
+    _7 = width_2 + _4 - (a * p)
+    _8 = i_w * _5 - _6 - (_6 + i_w * _7)  # apart
+    _9 = 1.0 / np.sqrt(_8 * _8 + blend * blend)  # i_size
+    _10 = _8 * _9  # share
+    _11 = 1.0 / (a * length)
+    _12 = total * _11  # turned
+    _13 = ca * _12  # d sa / d a
+    _14 = 1.0 / length
+    _15 = a * _14  # d length / d a
+    _16 = _15 + difference * _12
+    _17 = _13 * _16
+    _18 = sa * _12
+    _19 = total * (_11 * _11 * (length + a * _15))
+    _20 = _12 * _18 + ca * _19
+    _21 = _14 - (a * (_15 * (_14 * _14))) - (difference * _19)
+    _22 = _12 * _13 - (sa * _19)
+    _23 = _18 * _16
+    _24 = p * (0.5 * _17 - (sig * _20) + 0.5 * (_17 + sa * _21) - (base * _22)) + q * (0.5 * (ca * _21 - _23) - (0.5 * _23 + sig * _22) + base * _20)
+    _25 = base * _18
+    _26 = sig * _13 + 0.5 * (sa * _16) - _25  # d x / d a
+    _27 = base * _13
+    _28 = 0.5 * (ca * _16) - (sig * _18) - _27  # d y / d a
+    _29 = p * _26 + q * _28
+    _30 = _29 - p
+    _31 = i_w * _29 + i_w * _30
+    _32 = _9 * (_9 * (blend * blend * _9))  # bend
+    _33 = _32 * _31
+    _34 = p * i_w3  # d i_w / d p
+    _35 = _34 * _30 + i_w * (-1.0 + _26)  # d (d v / d a) / d p
+    _36 = _34 * _29 + i_w * _26
+    _37 = _1 - a
+    _38 = _34 * _5 - (i_w * _1) - (_34 * _7 + i_w * _37)  # d apart / d p
+    _39 = _32 * _38  # d share / d p
+    _40 = 0.5 * (_35 - _36 + end * (_31 * _39 + _10 * (_35 + _36)))  # d (d limit / d a) / d p
+    _41 = q * i_w3  # d i_w / d q
+    _42 = i_w * _28
+    _43 = _41 * _30 + _42  # d (d v / d a) / d q
+    _44 = _42 + _41 * _29
+    _45 = i_w * _3
+    _46 = _41 * _5 - _45 - (_45 + _41 * _7)  # d apart / d q
+    _47 = _32 * _46  # d share / d q
+    _48 = 0.5 * (_43 - _44 + end * (_31 * _47 + _10 * (_43 + _44)))  # d (d limit / d a) / d q
+    _49 = 0.5 * (p * _2) + 0.5 * (q * _0)
+    _50 = i_w * _49  # d v / d _f1
+    _51 = _32 * _50
+    _52 = 0.5 * (end * (2.0 * (_10 * (i_w * (0.5 * (p * _27) - (0.5 * (q * _25))))) - (2.0 * (_31 * _51))))  # d (d limit / d a) / d _f1
+    _53 = mate * sa
+    _54 = mate * ca
+    _55 = 0.5 * (p * _53) + 0.5 * (q * _54)
+    _56 = i_w * _55  # d u / d _f2
+    _57 = _32 * _56
+    _58 = 0.5 * (end * (2.0 * (_31 * _57) + 2.0 * (_10 * (i_w * (0.5 * (q * (mate * _18)) - (0.5 * (p * (mate * _13))))))))  # d (d limit / d a) / d _f2
+    _59 = 0.5 * (end * _39)  # d (d limit / d h) / d p
+    _60 = 0.5 * (end * _47)  # d (d limit / d h) / d q
+    _61 = end * _57  # d (d limit / d h) / d _f2
+    _62 = i_w3 + 3.0 * (p * (p * i_w5))  # d (d i_w / d p) / d p
+    _63 = _34 * _1
+    _64 = _5 * _62 - _63 - _63  # d (d u / d p) / d p
+    _65 = _34 * _37
+    _66 = _65 + _7 * _62 + _65  # d (d v / d p) / d p
+    _67 = q * i_w5
+    _68 = p * _67
+    _69 = _34 * _3
+    _70 = 3.0 * (_5 * _68) - _69 - (_41 * _1)  # d (d u / d p) / d q
+    _71 = _69 + 3.0 * (_7 * _68) + _41 * _37  # d (d v / d p) / d q
+    _72 = 0.5 * (_70 + _71 - (end * (_38 * _47 + _10 * (_70 - _71))))  # d (d limit / d p) / d q
+    _73 = 0.5 * (end * (2.0 * (_38 * _51) + 2.0 * (_10 * (_34 * _49 + 0.5 * (i_w * _2)))))  # d (d limit / d p) / d _f1
+    _74 = i_w3 + 3.0 * (q * _67)  # d (d i_w / d q) / d q
+    _75 = _41 * _3
+    _76 = _5 * _74 - _75 - _75  # d (d u / d q) / d q
+    _77 = _75 + _75 + _7 * _74  # d (d v / d q) / d q
+    _78 = 0.5 * (end * (2.0 * (_46 * _51) + 2.0 * (_10 * (_41 * _49 + 0.5 * (i_w * _0)))))  # d (d limit / d q) / d _f1
+    _79 = 2.0 * (end * (_50 * _57))  # d (d limit / d _f1) / d _f2
+    hess[0, 0] = 0.5 * (end * (2.0 * (_10 * (i_w * _24)) - (_31 * _33)))
+    hess[0, 1] = -(0.5 * (end * _33))
+    hess[0, 2] = _40
+    hess[0, 3] = _48
+    hess[0, 4] = _52
+    hess[0, 5] = _58
+    hess[1, 0] = -(0.5 * (end * _33))
+    hess[1, 1] = -(0.5 * (end * _32))
+    hess[1, 2] = _59
+    hess[1, 3] = _60
+    hess[1, 4] = -(end * _51)
+    hess[1, 5] = _61
+    hess[2, 0] = _40
+    hess[2, 1] = _59
+    hess[2, 2] = 0.5 * (_64 + _66 - (end * (_38 * _39 + _10 * (_64 - _66))))
+    hess[2, 3] = _72
+    hess[2, 4] = _73
+    hess[2, 5] = -(0.5 * (end * (2.0 * (_38 * _57) + 2.0 * (_10 * (_34 * _55 + 0.5 * (i_w * _53))))))
+    hess[3, 0] = _48
+    hess[3, 1] = _60
+    hess[3, 2] = _72
+    hess[3, 3] = 0.5 * (_76 + _77 - (end * (_46 * _47 + _10 * (_76 - _77))))
+    hess[3, 4] = _78
+    hess[3, 5] = -(0.5 * (end * (2.0 * (_46 * _57) + 2.0 * (_10 * (_41 * _55 + 0.5 * (i_w * _54))))))
+    hess[4, 0] = _52
+    hess[4, 1] = -(end * _51)
+    hess[4, 2] = _73
+    hess[4, 3] = _78
+    hess[4, 4] = -(2.0 * (end * (_50 * _51)))
+    hess[4, 5] = _79
+    hess[5, 0] = _58
+    hess[5, 1] = _61
+    hess[5, 2] = -(0.5 * (end * (2.0 * (_38 * _57) + 2.0 * (_10 * (_34 * _55 + 0.5 * (i_w * _53))))))
+    hess[5, 3] = -(0.5 * (end * (2.0 * (_46 * _57) + 2.0 * (_10 * (_41 * _55 + 0.5 * (i_w * _54))))))
+    hess[5, 4] = _79
+    hess[5, 5] = -(2.0 * (end * (_56 * _57)))
 
 
 @njit(cache=True, straight=True, error_model="numpy", fastmath={"contract": True, "arcp": True}, forceinline=True)
