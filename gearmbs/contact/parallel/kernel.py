@@ -11,7 +11,7 @@ import numpy as np
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.corners import PLANE
-from gearmbs.contact.laws import friction_law, power, pressure
+from gearmbs.contact.laws import elastic_pressure, friction_law, pressure
 from gearmbs.contact.parallel import derived as D
 from gearmbs.contact.places import level_normal
 from gearmbs.contact.records import inlined, kernel, options_at, pair_at
@@ -89,7 +89,7 @@ def flanks_at(wheels, own, gap, place, contact):
 @inlined
 def press(options, wheels, depth, approach):
     """Return the law of a contact over the face: force, its slopes by depth and rate, energy, elastic part."""
-    e, elastic = wheels.exponent, wheels.stiffness * power(depth, wheels.exponent)
+    e, elastic = wheels.exponent, elastic_pressure(wheels.stiffness, wheels.exponent, depth)
     p, p_d, p_r, energy, _ = pressure(options.law, elastic, e, wheels.damping, wheels.damping_depth, depth, approach)
     b = wheels.width
     return b * p, b * p_d, b * p_r, b * energy, b * elastic
