@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gearmbs.kernels import derive
-from gearmbs.kernels.derive import ONE, ZERO, Function, choose, derivative, given, inputs, slopes, tangent
+from gearmbs.kernels.derive import ONE, ZERO, Function, along, choose, derivative, given, inputs, slopes, tangent
 from gearmbs.kernels.named import names_in, told_names
 from tests.jets import jets
 from tests.says import says
@@ -228,3 +228,22 @@ def test_nothing_is_computed_twice_and_zeros_are_left_off():
     assert source.count("x * y") == 1
     assert "out[0]" not in source
     assert "out[1] -= " in source
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_one_pass_along_rates_is_the_sum_of_derivatives_times_rates(name):
+    variables, rates = inputs("x y z"), inputs("u v w")
+    value = choose(variables[0], variables[1], LAWS[name](*variables), variables[2] * variables[0])
+    moves = dict(zip(variables, rates))
+    made = compiled(Function("law", "x, y, z, u, v, w", "Law.", [tangent(value, moves), along(value, moves)]))
+    for numbers in ([2.3, 1.1, 0.7, 0.2, -0.4, 1.3], [1.1, 2.3, 0.7, 0.2, -0.4, 1.3]):
+        apart, together = made(*numbers)
+        assert together == pytest.approx(apart, rel=1e-13)
+
+
+def test_a_rule_of_an_expression_stands_for_the_chain():
+    (x,) = inputs("x")
+    cosine = np.cos(x)
+    length = given(np.sqrt(1.0 - cosine * cosine), {x: cosine})
+    assert derivative(length, x) is cosine
+    assert derivative(2.0 * length, x) is 2.0 * cosine
