@@ -34,6 +34,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearmbs.dae.problem import ModelError
+from gearmbs.mechanism.forces.joint_friction import REALS
 from gearmbs.mechanism.language.syntax import Units
 from gearmbs.mechanism.parts import elements as el
 from gearmbs.mechanism.parts.bodies import Marker
@@ -53,6 +54,8 @@ EFFECTS = ("all", "stiction", "sliding")
 OVERLAPS = {"constant": 0.0, "increasing": 1.0, "decreasing": -1.0}
 TINY = 1e-6
 """Forces, in the unit of force, and slips, in transition velocities, below which lengths of vectors are rounded off."""
+STEP = 1e-30
+"""Of complex steps: none is lost to rounding, and its square vanishes beside the number."""
 
 
 @dataclass(frozen=True)
@@ -319,7 +322,7 @@ class FrictionKind:
     text : callable
         ``text(writer)`` returns the load in the function language.
     kernel : str
-        Which of the kinds of `gearmbs.mechanism.forces.friction_kernel` it is.
+        Which of the kinds of `gearmbs.mechanism.forces.joint_friction` it is.
     force, torque : bool
         Whether it rubs along z of J, and by turning.
     pressing : dict of str to str or None
@@ -349,7 +352,7 @@ class FrictionKind:
 
 _PIN = FrictionKind(
     text=_Writer.pin,
-    kernel="PIN",
+    kernel="pin",
     pressing={"reaction_force": None, "bending_moment": "bending_arm"},
     lever="pin_radius",
     arm="friction_arm",
@@ -358,19 +361,19 @@ KINDS: dict[str, FrictionKind] = {
     "revolute": _PIN,
     "translational": FrictionKind(
         text=_Writer.slide,
-        kernel="SLIDE",
+        kernel="slide",
         force=True,
         torque=False,
         pressing={"reaction_force": None, "bending_moment": "overlap", "torsional_moment": "reaction_arm"},
     ),
     "cylindrical": FrictionKind(
         text=_Writer.cylinder,
-        kernel="CYLINDER",
+        kernel="cylinder",
         force=True,
         pressing={"reaction_force": None, "bending_moment": "overlap"},
         lever="pin_radius",
     ),
-    "spherical": FrictionKind(text=_Writer.ball, kernel="BALL", pressing={"reaction_force": None}, lever="ball_radius"),
+    "spherical": FrictionKind(text=_Writer.ball, kernel="ball", pressing={"reaction_force": None}, lever="ball_radius"),
     "universal": replace(_PIN, yoke=True),
 }
 """The joints that take friction; that of another kind which rubs as one of these does is one row."""
@@ -440,63 +443,58 @@ class FrictionForce(ForceElement):
         return {"joint": self.joint, "friction": self.friction, "keys": (*self.text.variables, *self.text.states)}
 
     def compiled(self) -> Compiled:
-        from gearmbs.mechanism.forces import friction_kernel as fk
+        from gearmbs.mechanism.forces.joint_friction.kernel import KERNELS, SCRATCH
 
-        f, kind = self.friction, KINDS[self.joint.kind]
-        integers = np.zeros(fk.INTEGERS, dtype=np.int64)
-        integers[fk.KIND] = getattr(fk, kind.kernel)
-        integers[fk.FRAME] = 0 if kind.yoke and f.yoke == "i" else 1
-        reals = np.zeros(fk.REALS)
-        self._pressing(integers, reals)
-        length, force, torque = (self.units.factor(d) for d in ("length", "force", "torque"))
-        kept = 1.0 / f.mu_dynamic if "preload" in f.inputs else 0.0
-        reals[fk.LEVER] = length * (getattr(f, kind.lever) if kind.lever else f.pin_radius)
-        reals[fk.LIMIT_STATIC] = f.mu_dynamic if f.effect == "sliding" else f.mu_static
-        reals[fk.LIMIT_DYNAMIC] = 1e-6 * f.mu_static if f.effect == "stiction" else f.mu_dynamic
-        reals[fk.TRANSITION] = self.units.factor("velocity") * f.stiction_transition_velocity
-        if self.own_states:
-            reals[fk.DEFORMATION] = length * f.max_stiction_deformation
-            reals[fk.PER_DEFORMATION] = f.mu_static / reals[fk.DEFORMATION]
-        reals[fk.KEPT_FORCE], reals[fk.KEPT_TORQUE] = force * kept * f.preload_force, torque * kept * f.preload_torque
-        reals[fk.MAX_FORCE] = np.inf if f.max_force is None else force * f.max_force
-        reals[fk.MAX_TORQUE] = np.inf if f.max_torque is None else torque * f.max_torque
+        kind, numbers = KINDS[self.joint.kind], self._numbers(self.friction)
+        kernel, changed = KERNELS[kind.kernel]
+        loaded = any(numbers[REALS.index(part)] != 0.0 for part in REALS if part.startswith("per_"))
         return Compiled(
-            fk.joint_friction, integers, reals, reactions=(self.joint.name,) if integers[fk.LOADED] else (),
-            scratch=fk.ROWS * (1 + 24 + len(self.own_states) + 6),
+            kernel, (0 if kind.yoke and self.friction.yoke == "i" else 1,), numbers,
+            reactions=(self.joint.name,) if loaded else (), scratch=SCRATCH, changed=changed,
         )  # fmt: skip
 
-    def _pressing(self, integers: np.ndarray, reals: np.ndarray) -> None:
-        """Fill in what presses the surfaces together."""
-        from gearmbs.mechanism.forces import friction_kernel as fk
+    def _reals_by(self, name: str, made: Compiled) -> np.ndarray:
+        """Return how the reals change with a parameter of the friction: a complex step of what makes them."""
+        value = getattr(self.friction, name, None)
+        if name not in PARAMETERS or value is None:
+            there = [one for one in PARAMETERS if getattr(self.friction, one) is not None]
+            raise ModelError(f"friction '{self.name}': it has no number '{name}'; it has {', '.join(there)}")
+        unit = self.units.factor(DIMENSIONS[name][1]) if name in DIMENSIONS else 1.0
+        moved = replace(self.friction, **{name: value + 1j * STEP})
+        return np.imag(self._numbers(moved)) / (STEP * unit)
 
-        f, kind = self.friction, KINDS[self.joint.kind]
+    def _numbers(self, f: JointFriction) -> np.ndarray:
+        """Return the reals of a friction, `REALS`, SI; those that the joint does not use press by nothing."""
+        kind = KINDS[self.joint.kind]
         length, force, torque = (self.units.factor(d) for d in ("length", "force", "torque"))
-        by_force = "reaction_force" in f.inputs
-        bending, twist = "bending_moment" in f.inputs, "torsional_moment" in f.inputs
-        reals[fk.TINY_FORCE] = TINY * force
-        if kind.kernel == "BALL":
-            reals[fk.PER_FORCE] = float(by_force)
-        elif kind.kernel == "PIN":
-            reals[fk.PER_RADIAL] = length * f.pin_radius * by_force
-            reals[fk.PER_AXIAL] = length * f.friction_arm * by_force
-            if bending and f.bending_arm:
-                reals[fk.PER_BENDING], reals[fk.TINY_BENDING] = (
-                    f.pin_radius / f.bending_arm,
-                    TINY * f.pin_radius * torque,
-                )
-        else:
-            reals[fk.PER_RADIAL] = float(by_force)
-            if bending and f.overlap:
-                reals[fk.TINY_BENDING] = TINY * f.overlap * torque
-                reals[fk.OVERLAP], reals[fk.OVERLAP_SLOPE] = length * f.overlap, OVERLAPS[f.overlap_change]
-                integers[fk.CHANGES] = reals[fk.OVERLAP_SLOPE] != 0.0
-                reals[fk.PER_BENDING] = 1.0 if integers[fk.CHANGES] else 1.0 / reals[fk.OVERLAP]
-                reals[fk.START] = self.text.start
-            if "torsional_moment" in kind.pressing and twist and f.reaction_arm:
-                reals[fk.PER_TWIST] = 1.0 / (length * f.reaction_arm)
-                reals[fk.TINY_TWIST] = TINY * f.reaction_arm * torque
-        used = (fk.PER_RADIAL, fk.PER_AXIAL, fk.PER_FORCE, fk.PER_BENDING, fk.PER_TWIST)
-        integers[fk.LOADED] = any(reals[k] != 0.0 for k in used)
+        kept = 1.0 / f.mu_dynamic if "preload" in f.inputs else 0.0
+        lever = getattr(f, kind.lever) if kind.lever else 0.0
+        turning = (torque * kept * f.preload_torque, np.inf if f.max_torque is None else torque * f.max_torque)
+        sliding = (force * kept * f.preload_force, np.inf if f.max_force is None else force * f.max_force)
+        by = dict.fromkeys(REALS, 0.0) | {"overlap": 1.0, "tiny_bending": TINY, "tiny_twist": TINY}
+        by |= {
+            "lever": length * lever,
+            "tiny_force": TINY * force,
+            "static": f.mu_dynamic if f.effect == "sliding" else f.mu_static,
+            "dynamic": 1e-6 * f.mu_static if f.effect == "stiction" else f.mu_dynamic,
+            "transition": self.units.factor("velocity") * f.stiction_transition_velocity,
+            "deformation": length * f.max_stiction_deformation,
+            **dict(zip(("kept", "most"), sliding if kind.force else turning)),
+            **dict(zip(("kept_about", "most_about"), turning)),
+        }
+        arms = {name: getattr(f, arm) for name, arm in kind.pressing.items() if arm and name in f.inputs}
+        bending, twist = (arms.get(f"{name}_moment", 0.0) for name in ("bending", "torsional"))
+        if "reaction_force" in f.inputs:
+            by["per_force"] = length * lever if kind.kernel == "pin" else 1.0
+            by["per_axial"] = length * f.friction_arm if kind.kernel == "pin" else 0.0
+        if bending.real and kind.kernel == "pin":
+            by |= {"per_bending": lever / bending, "tiny_bending": TINY * lever * torque}
+        elif bending.real:
+            by |= {"per_bending": 1.0, "tiny_bending": TINY * bending * torque, "overlap": length * bending}
+            by |= {"overlap_slope": OVERLAPS[f.overlap_change], "start": self.text.start}
+        if twist.real:
+            by |= {"per_twist": 1.0 / (length * twist), "tiny_twist": TINY * twist * torque}
+        return np.array([by[name] for name in REALS])
 
     def __repr__(self) -> str:
         return f"FrictionForce({self.name!r} in joint {self.joint.name!r})"
@@ -515,6 +513,8 @@ DIMENSIONS = {
     ),
 }  # fmt: skip
 """Dimension of each parameter with a unit, for texts and in the function language."""
+PARAMETERS = ("mu_static", "mu_dynamic", *DIMENSIONS)
+"""All that are numbers."""
 
 
 def friction_of(

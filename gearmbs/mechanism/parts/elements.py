@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, Diagnostic
+from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_COLUMNS, Diagnostic
 from gearmbs.dae.problem import ANY, ModelError
 from gearmbs.dae.problem import NOT_NEGATIVE as NOT_NEGATIVE
 from gearmbs.dae.problem import POSITIVE as POSITIVE
@@ -184,7 +184,7 @@ class ForceElement(OwnAttributes):
         frames : ndarray, shape (markers, 18)
             Of the markers that it sees, as kernels do: origin, orientation by rows, velocity, angular velocity.
         states, inputs : ndarray, optional
-            Its own states; references of the angles that it counts. Default: zeros.
+            Its own states; reactions that it sees, references of the angles that it counts. Default: zeros.
 
         Returns
         -------
@@ -194,25 +194,44 @@ class ForceElement(OwnAttributes):
         Raises
         ------
         ModelError
-            For a name that it does not have, and elements whose derivatives by their numbers are not known.
+            For a name that it does not have, elements whose derivatives by their numbers are not known, and arrays of
+            another shape.
         """
         made = self.compiled()
-        label = f"{self.kind} '{self.name}'"
         if made.changed is None:
-            raise ModelError(f"{label}: its derivatives by parameters are not known; take differences of two elements")
-        setting = made.settings.get(name)
-        if setting is None:
-            there = ", ".join(made.settings) or "none"
-            raise ModelError(f"{label}: it has no number '{name}' to be differentiated by; there are {there}")
-        reals, changed = np.array(made.reals, dtype=float), np.zeros(len(made.reals))
-        for at, factor, _ in ((setting.at, setting.factor, 0.0), *setting.others):
-            changed[at] = factor
-        own = np.zeros(len(self.states)) if states is None else np.asarray(states, dtype=float)
-        seen = np.zeros(6 * len(made.reactions) + len(made.times) + len(made.angles)) if inputs is None else inputs
+            raise ModelError(
+                f"{self.kind} '{self.name}': its derivatives by parameters are not known; take differences of two "
+                "elements"
+            )
+        reals, changed = np.array(made.reals, dtype=float), self._reals_by(name, made)
+        counts = (len(self.states), 6 * len(made.reactions) + len(made.times) + len(made.angles))
+        own, seen = (
+            np.zeros(n) if x is None else np.ascontiguousarray(x, dtype=float) for x, n in zip((states, inputs), counts)
+        )
+        frames = np.ascontiguousarray(frames, dtype=float)
+        shapes = (frames.shape, own.shape, seen.shape)
+        wanted = ((len(made.sees or self.markers), FRAME_COLUMNS), *((n,) for n in counts))
+        if shapes != wanted:
+            raise ModelError(
+                f"{self.kind} '{self.name}': frames, states and inputs of the shapes {shapes}; give {wanted}"
+            )
         out = np.zeros(6 * self.wrenches + len(own))
         integers = np.array(made.integers, dtype=np.int64)
         made.changed(integers, reals, changed, frames, own, seen, np.zeros(made.scratch), out)
         return out
+
+    def _reals_by(self, name: str, made: Compiled) -> np.ndarray:
+        """Return how the reals change with one of its numbers."""
+        setting = made.settings.get(name)
+        if setting is None:
+            there = ", ".join(made.settings) or "none"
+            raise ModelError(
+                f"{self.kind} '{self.name}': it has no number '{name}' to be differentiated by; there are {there}"
+            )
+        changed = np.zeros(len(made.reals))
+        for at, factor, _ in ((setting.at, setting.factor, 0.0), *setting.others):
+            changed[at] = factor
+        return changed
 
 
 @dataclass(eq=False, repr=False)
