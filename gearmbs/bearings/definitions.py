@@ -23,6 +23,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gearmbs.kernels.derive import ONE, ZERO, Function, Value, derivative, given, inputs, product, slopes, tangent
+from gearmbs.mechanism.forces.definitions import Frame, changed, dot, impact_forces, kernels, seen_from
 
 Numbers = Sequence[Value]
 
@@ -72,6 +73,15 @@ def damped(force, chi, rate):
 def in_plane(d0, d1, d2, a0, a1, c, s):
     """Return u, w and phi of the inner ring at an element in the direction (c, s)."""
     return d0 * c + d1 * s, d2, a0 * c + a1 * s
+
+
+def in_a_bore(d, u, z):
+    """Return eccentricity, its rate and its direction, of a journal at d from the middle of a bore of the axis z."""
+    along = dot(d, z)
+    rho = [x - along * axis for x, axis in zip(d, z)]
+    eccentricity = np.sqrt(dot(rho, rho))
+    n = [x / eccentricity for x in rho]
+    return eccentricity, dot(n, u), n
 
 
 # What is made of them. Of a parameter p there is a kernel that finds derivatives along dp: of the law, of a path.
@@ -273,8 +283,26 @@ def element(plain: bool) -> list[Function]:
     ]  # fmt: skip
 
 
+def bore() -> list[Function]:
+    """Return the kernels of a journal with clearance, a round one in a round bore."""
+    one, two = Frame("one", "i"), Frame("two", "j")
+    d, v, _ = one.minus(two)
+    clearance, *numbers = law = inputs("clearance stiffness exponent damping full_depth", "law")
+    eccentricity, rate, n = in_a_bore(d, seen_from(d, v, two.w), two.axes[2])
+    depth = eccentricity - clearance
+    elastic, force = impact_forces(depth, rate, *numbers)
+    load = [-(force * x) for x in n]
+    told = [elastic * depth / (numbers[1] + 1.0), (force - elastic) * rate]
+    return [
+        Function("bore_depth", "one, two, law", "Return how deep a journal is in its bore.", [depth]),
+        *kernels("bore", "the force of a bore on its journal", load, 0, one.variations + two.variations),
+        Function("bore_energies", "one, two, law", "Return the energy stored, and the power dissipated.", told),
+        changed("bore", "one, two, law", load, 0, law),
+    ]
+
+
 def functions() -> list[Function]:
     return [
         *smooth_part(), *friction_torque(), *law_changed(), ball_contact(), roller_contact(),
-        *path(True), *path(False), *element(True), *element(False),
+        *path(True), *path(False), *element(True), *element(False), *bore(),
     ]  # fmt: skip

@@ -15,6 +15,28 @@ from gearmbs.kernels.derive import ZERO, Function, Value, derivative, given, inp
 Vector = Sequence[Value]
 
 
+def dot(a, b):
+    """Return the product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a, b):
+    """Return the cross product of two vectors."""
+    return [a[c - 2] * b[c - 1] - a[c - 1] * b[c - 2] for c in range(3)]
+
+
+def step(x):
+    """Return STEP(x, 0, 0, 1, 1)."""
+    r = np.minimum(np.maximum(x, 0.0), 1.0)
+    return r * r * (3.0 - 2.0 * r)
+
+
+def impact_forces(depth, rate, stiffness, exponent, damping, full_depth):
+    """Return k d^e, and IMPACT: max(0, k d^e + c STEP(d, 0, 0, d_max, 1) d')."""
+    elastic = stiffness * depth**exponent
+    return elastic, np.maximum(elastic + damping * step(depth / full_depth) * rate, 0.0)
+
+
 def line_force(d, u, stiffness, damping, free, preload):
     """Return F along the line d from J to I, seen from J moving by u."""
     length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
@@ -31,7 +53,7 @@ def axis_torque(z, w, angle, stiffness, damping, free, preload):
 
 def seen_from(d, v, spin):
     """Return v - spin x d, the velocity of a point at d from a frame that turns."""
-    return [v[c] - (spin[c - 2] * d[c - 1] - spin[c - 1] * d[c - 2]) for c in range(3)]
+    return [one - other for one, other in zip(v, cross(spin, d))]
 
 
 class Frame:
@@ -90,7 +112,7 @@ def axis_spring() -> list[Function]:
 
 def changed(name: str, arguments: str, load: Vector, row: int, law: Vector) -> Function:
     """Return the kernel of the derivative of a load along a change of the numbers of its law."""
-    rates = dict(zip(law, inputs(" ".join(f"d_{one}" for one in LAW.split()), "changed")))
+    rates = dict(zip(law, inputs(" ".join(f"d_{one.name}" for one in law), "changed")))
     sets = placed("out[{}]", row, [tangent(one, rates) for one in load])
     return Function(
         f"{name}_changed", f"{arguments}, changed, out", "Write how it changes with its numbers.", sets=sets

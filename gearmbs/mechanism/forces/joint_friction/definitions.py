@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gearmbs.kernels.derive import Function, Value, choose, inputs, tangent
-from gearmbs.mechanism.forces.definitions import Frame, matrix, placed, rows, seen_from
+from gearmbs.mechanism.forces.definitions import Frame, dot, matrix, placed, rows, seen_from, step
 from gearmbs.mechanism.forces.joint_friction import BALL, NAMES, PIN, REALS
 
 Numbers = Sequence[Value]
@@ -31,15 +31,9 @@ def rounded(vector, tiny):
     return np.sqrt(sum((x * x for x in vector), tiny * tiny))
 
 
-def dot(a, b):
-    """Return the product of two vectors."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 def ramp(speed, transition, low, high):
     """Return STEP(V, V_t, low, 1.5 V_t, high)."""
-    r = np.minimum(np.maximum((speed - transition) / (0.5 * transition), 0.0), 1.0)
-    return low + (high - low) * (r * r * (3.0 - 2.0 * r))
+    return low + (high - low) * step((speed - transition) / (0.5 * transition))
 
 
 def by_velocity(slips, speed, p):

@@ -15,7 +15,7 @@ def one_creeping_loads(seen, states, reals, loads, rates):
     _0 = ((-s0) if 0.0 > s0 else s0)  # speed
     _1 = (_0 - transition) * (1.0 / (0.5 * transition))
     _2 = (_1 if _1 > 0.0 else 0.0)
-    _3 = (1.0 if _2 > 1.0 else _2)  # r
+    _3 = (1.0 if _2 > 1.0 else _2)
     _4 = 1.0 / transition
     _5 = _0 * _4  # ratio
     _6 = (((static + (dynamic - static) * (_3 * _3 * (3.0 - (2.0 * _3)))) * (1.0 / _0)) if _0 > transition else (0.5 * (static * _4 * (3.0 - (_5 * _5)))))  # factor
@@ -33,7 +33,7 @@ def one_creeping_slopes(seen, states, reals, slopes):
     _2 = 1.0 / (0.5 * transition)
     _3 = (_0 - transition) * _2
     _4 = (_3 if _3 > 0.0 else 0.0)
-    _5 = (1.0 if _4 > 1.0 else _4)  # r
+    _5 = (1.0 if _4 > 1.0 else _4)
     _6 = _5 * _5
     _7 = 3.0 - (2.0 * _5)
     _8 = static + _1 * (_6 * _7)
@@ -45,7 +45,7 @@ def one_creeping_slopes(seen, states, reals, slopes):
     _14 = s0 * _13  # mu[0]
     _15 = (most if (-(pressing * _14 + kept * _14)) > most else (-(pressing * _14 + kept * _14)))
     _16 = ((-1.0) if 0.0 > s0 else 1.0)  # d speed / d s0
-    _17 = (0.0 if _4 > 1.0 else (((_2 * _16) if _3 > 0.0 else 0.0)))  # d r / d s0
+    _17 = (0.0 if _4 > 1.0 else (((_2 * _16) if _3 > 0.0 else 0.0)))
     _18 = ((_9 * (_1 * (2.0 * (_7 * (_5 * _17)) - (2.0 * (_6 * _17)))) - (_8 * (_9 * _9 * _16))) if _0 > transition else (-(_11 * (_12 * (_10 * _16)))))  # d factor / d s0
     _19 = _13 + s0 * _18  # d mu[0] / d s0
     _20 = (((0.0 if (-(pressing * _14 + kept * _14)) > most else (-(pressing * _19 + kept * _19)))) if _15 > (-most) else 0.0)  # d made[0] / d s0
@@ -64,7 +64,7 @@ def one_creeping_changed(seen, states, reals, d_seen, changed, out):
     _3 = 1.0 / (0.5 * transition)
     _4 = _2 * _3
     _5 = (_4 if _4 > 0.0 else 0.0)
-    _6 = (1.0 if _5 > 1.0 else _5)  # r
+    _6 = (1.0 if _5 > 1.0 else _5)
     _7 = _6 * _6
     _8 = 3.0 - (2.0 * _6)
     _9 = _7 * _8
@@ -81,7 +81,7 @@ def one_creeping_changed(seen, states, reals, d_seen, changed, out):
     _20 = (((0.0 if (-(pressing * _17 + kept * _17)) > most else (-(pressing * _19 + kept * _19)))) if _18 > (-most) else 0.0)  # d made[0] / d static
     _21 = s0 * (((_9 * _11) if _0 > transition else 0.0))  # d mu[0] / d dynamic
     _22 = (((0.0 if (-(pressing * _17 + kept * _17)) > most else (-(pressing * _21 + kept * _21)))) if _18 > (-most) else 0.0)  # d made[0] / d dynamic
-    _23 = (0.0 if _5 > 1.0 else (((-(_3 + 0.5 * (_2 * (_3 * _3)))) if _4 > 0.0 else 0.0)))  # d r / d transition
+    _23 = (0.0 if _5 > 1.0 else (((-(_3 + 0.5 * (_2 * (_3 * _3)))) if _4 > 0.0 else 0.0)))
     _24 = _12 * _12
     _25 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _23)) - (2.0 * (_7 * _23))))) if _0 > transition else (0.5 * (2.0 * (_13 * (_14 * (_0 * _24))) - (_15 * (static * _24)))))  # d factor / d transition
     _26 = s0 * _25  # d mu[0] / d transition
@@ -89,7 +89,7 @@ def one_creeping_changed(seen, states, reals, d_seen, changed, out):
     _28 = (((0.0 if (-(pressing * _17 + kept * _17)) > most else (-_17))) if _18 > (-most) else 0.0)  # d made[0] / d kept
     _29 = d_static * _20 + d_dynamic * _22 + d_transition * _27 + d_kept * _28 + d_most * ((((1.0 if (-(pressing * _17 + kept * _17)) > most else 0.0)) if _18 > (-most) else (-1.0)))
     _30 = ((-1.0) if 0.0 > s0 else 1.0)  # d speed / d s0
-    _31 = (0.0 if _5 > 1.0 else (((_3 * _30) if _4 > 0.0 else 0.0)))  # d r / d s0
+    _31 = (0.0 if _5 > 1.0 else (((_3 * _30) if _4 > 0.0 else 0.0)))
     _32 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _31)) - (2.0 * (_7 * _31)))) - (_10 * (_11 * _11 * _30))) if _0 > transition else (-(_13 * (_14 * (_12 * _30)))))  # d factor / d s0
     _33 = _16 + s0 * _32  # d mu[0] / d s0
     _34 = (((0.0 if (-(pressing * _17 + kept * _17)) > most else (-(pressing * _33 + kept * _33)))) if _18 > (-most) else 0.0)  # d made[0] / d s0
@@ -106,7 +106,7 @@ def one_sticking_loads(seen, states, reals, loads, rates):
     _2 = ((-s0) if 0.0 > s0 else s0)  # speed
     _3 = (_2 - transition) * (1.0 / (0.5 * transition))
     _4 = (_3 if _3 > 0.0 else 0.0)
-    _5 = (1.0 if _4 > 1.0 else _4)  # r
+    _5 = (1.0 if _4 > 1.0 else _4)
     _6 = _5 * _5 * (3.0 - (2.0 * _5))
     _7 = s0 - (z0 * (_2 * _0 * (1.0 / (static + (dynamic - static) * _6))))  # rates[0]
     _8 = _0 * (z0 + (_1 - (_6 * _1)) * _7)  # mu[0]
@@ -126,7 +126,7 @@ def one_sticking_slopes(seen, states, reals, slopes):
     _3 = 1.0 / (0.5 * transition)
     _4 = (_2 - transition) * _3
     _5 = (_4 if _4 > 0.0 else 0.0)
-    _6 = (1.0 if _5 > 1.0 else _5)  # r
+    _6 = (1.0 if _5 > 1.0 else _5)
     _7 = _6 * _6
     _8 = 3.0 - (2.0 * _6)
     _9 = _7 * _8
@@ -139,7 +139,7 @@ def one_sticking_slopes(seen, states, reals, slopes):
     _16 = _0 * (z0 + _10 * _15)  # mu[0]
     _17 = (most if (-(pressing * _16 + kept * _16)) > most else (-(pressing * _16 + kept * _16)))
     _18 = ((-1.0) if 0.0 > s0 else 1.0)  # d speed / d s0
-    _19 = (0.0 if _5 > 1.0 else (((_3 * _18) if _4 > 0.0 else 0.0)))  # d r / d s0
+    _19 = (0.0 if _5 > 1.0 else (((_3 * _18) if _4 > 0.0 else 0.0)))
     _20 = 2.0 * (_8 * (_6 * _19)) - (2.0 * (_7 * _19))
     _21 = 1.0 - (z0 * (_13 * (_0 * _18) - (_11 * (_13 * _13 * (_12 * _20)))))  # d rates[0] / d s0
     _22 = _0 * (_10 * _21 - (_15 * (_1 * _20)))  # d mu[0] / d s0
@@ -168,7 +168,7 @@ def one_sticking_changed(seen, states, reals, d_seen, changed, out):
     _6 = 1.0 / (0.5 * transition)
     _7 = _5 * _6
     _8 = (_7 if _7 > 0.0 else 0.0)
-    _9 = (1.0 if _8 > 1.0 else _8)  # r
+    _9 = (1.0 if _8 > 1.0 else _8)
     _10 = _9 * _9
     _11 = 3.0 - (2.0 * _9)
     _12 = _10 * _11
@@ -187,7 +187,7 @@ def one_sticking_changed(seen, states, reals, d_seen, changed, out):
     _25 = z0 * (_14 * (_12 * _21))  # d rates[0] / d dynamic
     _26 = _1 * (_13 * _25)  # d mu[0] / d dynamic
     _27 = (((0.0 if (-(pressing * _19 + kept * _19)) > most else (-(pressing * _26 + kept * _26)))) if _20 > (-most) else 0.0)  # d made[0] / d dynamic
-    _28 = (0.0 if _8 > 1.0 else (((-(_6 + 0.5 * (_5 * (_6 * _6)))) if _7 > 0.0 else 0.0)))  # d r / d transition
+    _28 = (0.0 if _8 > 1.0 else (((-(_6 + 0.5 * (_5 * (_6 * _6)))) if _7 > 0.0 else 0.0)))
     _29 = 2.0 * (_11 * (_9 * _28)) - (2.0 * (_10 * _28))
     _30 = z0 * (_14 * (_21 * (_15 * _29)))  # d rates[0] / d transition
     _31 = deformation * (_2 * _2)
@@ -200,7 +200,7 @@ def one_sticking_changed(seen, states, reals, d_seen, changed, out):
     _38 = (((0.0 if (-(pressing * _19 + kept * _19)) > most else (-_19))) if _20 > (-most) else 0.0)  # d made[0] / d kept
     _39 = d_static * _24 + d_dynamic * _27 + d_transition * _33 + d_deformation * _37 + d_kept * _38 + d_most * ((((1.0 if (-(pressing * _19 + kept * _19)) > most else 0.0)) if _20 > (-most) else (-1.0)))
     _40 = ((-1.0) if 0.0 > s0 else 1.0)  # d speed / d s0
-    _41 = (0.0 if _8 > 1.0 else (((_6 * _40) if _7 > 0.0 else 0.0)))  # d r / d s0
+    _41 = (0.0 if _8 > 1.0 else (((_6 * _40) if _7 > 0.0 else 0.0)))
     _42 = 2.0 * (_11 * (_9 * _41)) - (2.0 * (_10 * _41))
     _43 = 1.0 - (z0 * (_16 * (_1 * _40) - (_14 * (_21 * (_15 * _42)))))  # d rates[0] / d s0
     _44 = _1 * (_13 * _43 - (_17 * (_3 * _42)))  # d mu[0] / d s0
@@ -217,7 +217,7 @@ def two_creeping_loads(seen, states, reals, loads, rates):
     _0 = np.sqrt(1e-12 * (transition * transition) + s0 * s0 + s1 * s1)  # speed
     _1 = (_0 - transition) * (1.0 / (0.5 * transition))
     _2 = (_1 if _1 > 0.0 else 0.0)
-    _3 = (1.0 if _2 > 1.0 else _2)  # r
+    _3 = (1.0 if _2 > 1.0 else _2)
     _4 = 1.0 / transition
     _5 = _0 * _4  # ratio
     _6 = (((static + (dynamic - static) * (_3 * _3 * (3.0 - (2.0 * _3)))) * (1.0 / _0)) if _0 > transition else (0.5 * (static * _4 * (3.0 - (_5 * _5)))))  # factor
@@ -239,7 +239,7 @@ def two_creeping_slopes(seen, states, reals, slopes):
     _2 = 1.0 / (0.5 * transition)
     _3 = (_0 - transition) * _2
     _4 = (_3 if _3 > 0.0 else 0.0)
-    _5 = (1.0 if _4 > 1.0 else _4)  # r
+    _5 = (1.0 if _4 > 1.0 else _4)
     _6 = _5 * _5
     _7 = 3.0 - (2.0 * _5)
     _8 = static + _1 * (_6 * _7)
@@ -251,13 +251,13 @@ def two_creeping_slopes(seen, states, reals, slopes):
     _14 = s0 * _13  # mu[0]
     _15 = (most if (-(pressing * _14 + kept * _14)) > most else (-(pressing * _14 + kept * _14)))
     _16 = s0 * _9  # d speed / d s0
-    _17 = (0.0 if _4 > 1.0 else (((_2 * _16) if _3 > 0.0 else 0.0)))  # d r / d s0
+    _17 = (0.0 if _4 > 1.0 else (((_2 * _16) if _3 > 0.0 else 0.0)))
     _18 = _9 * _9
     _19 = ((_9 * (_1 * (2.0 * (_7 * (_5 * _17)) - (2.0 * (_6 * _17)))) - (_8 * (_18 * _16))) if _0 > transition else (-(_11 * (_12 * (_10 * _16)))))  # d factor / d s0
     _20 = _13 + s0 * _19  # d mu[0] / d s0
     _21 = (((0.0 if (-(pressing * _14 + kept * _14)) > most else (-(pressing * _20 + kept * _20)))) if _15 > (-most) else 0.0)  # d made[0] / d s0
     _22 = s1 * _9  # d speed / d s1
-    _23 = (0.0 if _4 > 1.0 else (((_2 * _22) if _3 > 0.0 else 0.0)))  # d r / d s1
+    _23 = (0.0 if _4 > 1.0 else (((_2 * _22) if _3 > 0.0 else 0.0)))
     _24 = ((_9 * (_1 * (2.0 * (_7 * (_5 * _23)) - (2.0 * (_6 * _23)))) - (_8 * (_18 * _22))) if _0 > transition else (-(_11 * (_12 * (_10 * _22)))))  # d factor / d s1
     _25 = s0 * _24  # d mu[0] / d s1
     _26 = (((0.0 if (-(pressing * _14 + kept * _14)) > most else (-(pressing * _25 + kept * _25)))) if _15 > (-most) else 0.0)  # d made[0] / d s1
@@ -288,7 +288,7 @@ def two_creeping_changed(seen, states, reals, d_seen, changed, out):
     _3 = 1.0 / (0.5 * transition)
     _4 = _2 * _3
     _5 = (_4 if _4 > 0.0 else 0.0)
-    _6 = (1.0 if _5 > 1.0 else _5)  # r
+    _6 = (1.0 if _5 > 1.0 else _5)
     _7 = _6 * _6
     _8 = 3.0 - (2.0 * _6)
     _9 = _7 * _8
@@ -308,7 +308,7 @@ def two_creeping_changed(seen, states, reals, d_seen, changed, out):
     _23 = s0 * _22  # d mu[0] / d dynamic
     _24 = (((0.0 if (-(pressing * _17 + kept * _17)) > most else (-(pressing * _23 + kept * _23)))) if _18 > (-most) else 0.0)  # d made[0] / d dynamic
     _25 = transition * _11
-    _26 = (0.0 if _5 > 1.0 else (((_3 * (-1.0 + 1e-12 * _25) - (0.5 * (_2 * (_3 * _3)))) if _4 > 0.0 else 0.0)))  # d r / d transition
+    _26 = (0.0 if _5 > 1.0 else (((_3 * (-1.0 + 1e-12 * _25) - (0.5 * (_2 * (_3 * _3)))) if _4 > 0.0 else 0.0)))
     _27 = _11 * _11
     _28 = _12 * _12
     _29 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _26)) - (2.0 * (_7 * _26)))) - (1e-12 * (_10 * (_27 * _25)))) if _0 > transition else (-(0.5 * (_15 * (static * _28) + 2.0 * (_13 * (_14 * (1e-12 * (_12 * _25) - (_0 * _28))))))))  # d factor / d transition
@@ -317,12 +317,12 @@ def two_creeping_changed(seen, states, reals, d_seen, changed, out):
     _32 = (((0.0 if (-(pressing * _17 + kept * _17)) > most else (-_17))) if _18 > (-most) else 0.0)  # d made[0] / d kept
     _33 = d_static * _21 + d_dynamic * _24 + d_transition * _31 + d_kept * _32 + d_most * ((((1.0 if (-(pressing * _17 + kept * _17)) > most else 0.0)) if _18 > (-most) else (-1.0)))
     _34 = s0 * _11  # d speed / d s0
-    _35 = (0.0 if _5 > 1.0 else (((_3 * _34) if _4 > 0.0 else 0.0)))  # d r / d s0
+    _35 = (0.0 if _5 > 1.0 else (((_3 * _34) if _4 > 0.0 else 0.0)))
     _36 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _35)) - (2.0 * (_7 * _35)))) - (_10 * (_27 * _34))) if _0 > transition else (-(_13 * (_14 * (_12 * _34)))))  # d factor / d s0
     _37 = _16 + s0 * _36  # d mu[0] / d s0
     _38 = (((0.0 if (-(pressing * _17 + kept * _17)) > most else (-(pressing * _37 + kept * _37)))) if _18 > (-most) else 0.0)  # d made[0] / d s0
     _39 = s1 * _11  # d speed / d s1
-    _40 = (0.0 if _5 > 1.0 else (((_3 * _39) if _4 > 0.0 else 0.0)))  # d r / d s1
+    _40 = (0.0 if _5 > 1.0 else (((_3 * _39) if _4 > 0.0 else 0.0)))
     _41 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _40)) - (2.0 * (_7 * _40)))) - (_10 * (_27 * _39))) if _0 > transition else (-(_13 * (_14 * (_12 * _39)))))  # d factor / d s1
     _42 = s0 * _41  # d mu[0] / d s1
     _43 = (((0.0 if (-(pressing * _17 + kept * _17)) > most else (-(pressing * _42 + kept * _42)))) if _18 > (-most) else 0.0)  # d made[0] / d s1
@@ -359,7 +359,7 @@ def two_sticking_loads(seen, states, reals, loads, rates):
     _2 = np.sqrt(1e-12 * (transition * transition) + s0 * s0 + s1 * s1)  # speed
     _3 = (_2 - transition) * (1.0 / (0.5 * transition))
     _4 = (_3 if _3 > 0.0 else 0.0)
-    _5 = (1.0 if _4 > 1.0 else _4)  # r
+    _5 = (1.0 if _4 > 1.0 else _4)
     _6 = _5 * _5 * (3.0 - (2.0 * _5))
     _7 = _1 - (_6 * _1)  # tau
     _8 = _2 * _0 * (1.0 / (static + (dynamic - static) * _6))  # fading
@@ -386,7 +386,7 @@ def two_sticking_slopes(seen, states, reals, slopes):
     _3 = 1.0 / (0.5 * transition)
     _4 = (_2 - transition) * _3
     _5 = (_4 if _4 > 0.0 else 0.0)
-    _6 = (1.0 if _5 > 1.0 else _5)  # r
+    _6 = (1.0 if _5 > 1.0 else _5)
     _7 = _6 * _6
     _8 = 3.0 - (2.0 * _6)
     _9 = _7 * _8
@@ -401,7 +401,7 @@ def two_sticking_slopes(seen, states, reals, slopes):
     _18 = 1.0 / _2
     _19 = s0 * _18  # d speed / d s0
     _20 = _13 * _13
-    _21 = (0.0 if _5 > 1.0 else (((_3 * _19) if _4 > 0.0 else 0.0)))  # d r / d s0
+    _21 = (0.0 if _5 > 1.0 else (((_3 * _19) if _4 > 0.0 else 0.0)))
     _22 = 2.0 * (_8 * (_6 * _21)) - (2.0 * (_7 * _21))
     _23 = _13 * (_0 * _19) - (_11 * (_20 * (_12 * _22)))  # d fading / d s0
     _24 = 1.0 - (z0 * _23)  # d rates[0] / d s0
@@ -409,7 +409,7 @@ def two_sticking_slopes(seen, states, reals, slopes):
     _26 = _0 * (_10 * _24 - (_15 * _25))  # d mu[0] / d s0
     _27 = (((0.0 if (-(pressing * _16 + kept * _16)) > most else (-(pressing * _26 + kept * _26)))) if _17 > (-most) else 0.0)  # d made[0] / d s0
     _28 = s1 * _18  # d speed / d s1
-    _29 = (0.0 if _5 > 1.0 else (((_3 * _28) if _4 > 0.0 else 0.0)))  # d r / d s1
+    _29 = (0.0 if _5 > 1.0 else (((_3 * _28) if _4 > 0.0 else 0.0)))
     _30 = 2.0 * (_8 * (_6 * _29)) - (2.0 * (_7 * _29))
     _31 = _1 * _30
     _32 = _13 * (_0 * _28) - (_11 * (_20 * (_12 * _30)))  # d fading / d s1
@@ -461,7 +461,7 @@ def two_sticking_changed(seen, states, reals, d_seen, changed, out):
     _6 = 1.0 / (0.5 * transition)
     _7 = _5 * _6
     _8 = (_7 if _7 > 0.0 else 0.0)
-    _9 = (1.0 if _8 > 1.0 else _8)  # r
+    _9 = (1.0 if _8 > 1.0 else _8)
     _10 = _9 * _9
     _11 = 3.0 - (2.0 * _9)
     _12 = _10 * _11
@@ -486,7 +486,7 @@ def two_sticking_changed(seen, states, reals, d_seen, changed, out):
     _31 = deformation * (_2 * _2)
     _32 = 1.0 / _4
     _33 = transition * _32
-    _34 = (0.0 if _8 > 1.0 else (((_6 * (-1.0 + 1e-12 * _33) - (0.5 * (_5 * (_6 * _6)))) if _7 > 0.0 else 0.0)))  # d r / d transition
+    _34 = (0.0 if _8 > 1.0 else (((_6 * (-1.0 + 1e-12 * _33) - (0.5 * (_5 * (_6 * _6)))) if _7 > 0.0 else 0.0)))
     _35 = 2.0 * (_11 * (_9 * _34)) - (2.0 * (_10 * _34))
     _36 = _31 + _3 * _35 - (_12 * _31)
     _37 = 1e-12 * (_16 * (_1 * _33)) - (_14 * (_22 * (_15 * _35)))  # d fading / d transition
@@ -502,7 +502,7 @@ def two_sticking_changed(seen, states, reals, d_seen, changed, out):
     _47 = (((0.0 if (-(pressing * _20 + kept * _20)) > most else (-_20))) if _21 > (-most) else 0.0)  # d made[0] / d kept
     _48 = d_static * _26 + d_dynamic * _30 + d_transition * _40 + d_deformation * _46 + d_kept * _47 + d_most * ((((1.0 if (-(pressing * _20 + kept * _20)) > most else 0.0)) if _21 > (-most) else (-1.0)))
     _49 = s0 * _32  # d speed / d s0
-    _50 = (0.0 if _8 > 1.0 else (((_6 * _49) if _7 > 0.0 else 0.0)))  # d r / d s0
+    _50 = (0.0 if _8 > 1.0 else (((_6 * _49) if _7 > 0.0 else 0.0)))
     _51 = 2.0 * (_11 * (_9 * _50)) - (2.0 * (_10 * _50))
     _52 = _16 * (_1 * _49) - (_14 * (_22 * (_15 * _51)))  # d fading / d s0
     _53 = 1.0 - (z0 * _52)  # d rates[0] / d s0
@@ -510,7 +510,7 @@ def two_sticking_changed(seen, states, reals, d_seen, changed, out):
     _55 = _1 * (_13 * _53 - (_18 * _54))  # d mu[0] / d s0
     _56 = (((0.0 if (-(pressing * _20 + kept * _20)) > most else (-(pressing * _55 + kept * _55)))) if _21 > (-most) else 0.0)  # d made[0] / d s0
     _57 = s1 * _32  # d speed / d s1
-    _58 = (0.0 if _8 > 1.0 else (((_6 * _57) if _7 > 0.0 else 0.0)))  # d r / d s1
+    _58 = (0.0 if _8 > 1.0 else (((_6 * _57) if _7 > 0.0 else 0.0)))
     _59 = 2.0 * (_11 * (_9 * _58)) - (2.0 * (_10 * _58))
     _60 = _3 * _59
     _61 = _16 * (_1 * _57) - (_14 * (_22 * (_15 * _59)))  # d fading / d s1
@@ -561,7 +561,7 @@ def three_creeping_loads(seen, states, reals, loads, rates):
     _0 = np.sqrt(1e-12 * (transition * transition) + s0 * s0 + s1 * s1 + s2 * s2)  # speed
     _1 = (_0 - transition) * (1.0 / (0.5 * transition))
     _2 = (_1 if _1 > 0.0 else 0.0)
-    _3 = (1.0 if _2 > 1.0 else _2)  # r
+    _3 = (1.0 if _2 > 1.0 else _2)
     _4 = 1.0 / transition
     _5 = _0 * _4  # ratio
     _6 = (((static + (dynamic - static) * (_3 * _3 * (3.0 - (2.0 * _3)))) * (1.0 / _0)) if _0 > transition else (0.5 * (static * _4 * (3.0 - (_5 * _5)))))  # factor
@@ -588,7 +588,7 @@ def three_creeping_slopes(seen, states, reals, slopes):
     _2 = 1.0 / (0.5 * transition)
     _3 = (_0 - transition) * _2
     _4 = (_3 if _3 > 0.0 else 0.0)
-    _5 = (1.0 if _4 > 1.0 else _4)  # r
+    _5 = (1.0 if _4 > 1.0 else _4)
     _6 = _5 * _5
     _7 = 3.0 - (2.0 * _5)
     _8 = static + _1 * (_6 * _7)
@@ -612,7 +612,7 @@ def three_creeping_slopes(seen, states, reals, slopes):
     _26 = _24 * _24
     _27 = most * (_26 * (_24 * (2.0 * (_15 * _16) + 2.0 * (_18 * _19) + 2.0 * (_21 * _22))))
     _28 = s0 * _9  # d speed / d s0
-    _29 = (0.0 if _4 > 1.0 else (((_2 * _28) if _3 > 0.0 else 0.0)))  # d r / d s0
+    _29 = (0.0 if _4 > 1.0 else (((_2 * _28) if _3 > 0.0 else 0.0)))
     _30 = _9 * _9
     _31 = ((_9 * (_1 * (2.0 * (_7 * (_5 * _29)) - (2.0 * (_6 * _29)))) - (_8 * (_30 * _28))) if _0 > transition else (-(_11 * (_12 * (_10 * _28)))))  # d factor / d s0
     _32 = _13 + s0 * _31  # d mu[0] / d s0
@@ -623,7 +623,7 @@ def three_creeping_slopes(seen, states, reals, slopes):
     _37 = pressing * (lever * _36) + kept * _36
     _38 = most * (_26 * (_24 * (2.0 * (_16 * _33) + 2.0 * (_19 * _35) + 2.0 * (_22 * _37))))
     _39 = s1 * _9  # d speed / d s1
-    _40 = (0.0 if _4 > 1.0 else (((_2 * _39) if _3 > 0.0 else 0.0)))  # d r / d s1
+    _40 = (0.0 if _4 > 1.0 else (((_2 * _39) if _3 > 0.0 else 0.0)))
     _41 = ((_9 * (_1 * (2.0 * (_7 * (_5 * _40)) - (2.0 * (_6 * _40)))) - (_8 * (_30 * _39))) if _0 > transition else (-(_11 * (_12 * (_10 * _39)))))  # d factor / d s1
     _42 = s0 * _41  # d mu[0] / d s1
     _43 = pressing * (lever * _42) + kept * _42
@@ -633,7 +633,7 @@ def three_creeping_slopes(seen, states, reals, slopes):
     _47 = pressing * (lever * _46) + kept * _46
     _48 = most * (_26 * (_24 * (2.0 * (_16 * _43) + 2.0 * (_19 * _45) + 2.0 * (_22 * _47))))
     _49 = s2 * _9  # d speed / d s2
-    _50 = (0.0 if _4 > 1.0 else (((_2 * _49) if _3 > 0.0 else 0.0)))  # d r / d s2
+    _50 = (0.0 if _4 > 1.0 else (((_2 * _49) if _3 > 0.0 else 0.0)))
     _51 = ((_9 * (_1 * (2.0 * (_7 * (_5 * _50)) - (2.0 * (_6 * _50)))) - (_8 * (_30 * _49))) if _0 > transition else (-(_11 * (_12 * (_10 * _49)))))  # d factor / d s2
     _52 = s0 * _51  # d mu[0] / d s2
     _53 = pressing * (lever * _52) + kept * _52
@@ -668,7 +668,7 @@ def three_creeping_changed(seen, states, reals, d_seen, changed, out):
     _3 = 1.0 / (0.5 * transition)
     _4 = _2 * _3
     _5 = (_4 if _4 > 0.0 else 0.0)
-    _6 = (1.0 if _5 > 1.0 else _5)  # r
+    _6 = (1.0 if _5 > 1.0 else _5)
     _7 = _6 * _6
     _8 = 3.0 - (2.0 * _6)
     _9 = _7 * _8
@@ -714,7 +714,7 @@ def three_creeping_changed(seen, states, reals, d_seen, changed, out):
     _49 = pressing * (lever * _48) + kept * _48
     _50 = most * (_30 * (_27 * (2.0 * (_19 * _45) + 2.0 * (_22 * _47) + 2.0 * (_25 * _49))))
     _51 = transition * _11
-    _52 = (0.0 if _5 > 1.0 else (((_3 * (-1.0 + 1e-12 * _51) - (0.5 * (_2 * (_3 * _3)))) if _4 > 0.0 else 0.0)))  # d r / d transition
+    _52 = (0.0 if _5 > 1.0 else (((_3 * (-1.0 + 1e-12 * _51) - (0.5 * (_2 * (_3 * _3)))) if _4 > 0.0 else 0.0)))
     _53 = _11 * _11
     _54 = _12 * _12
     _55 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _52)) - (2.0 * (_7 * _52)))) - (1e-12 * (_10 * (_53 * _51)))) if _0 > transition else (-(0.5 * (_15 * (static * _54) + 2.0 * (_13 * (_14 * (1e-12 * (_12 * _51) - (_0 * _54))))))))  # d factor / d transition
@@ -731,7 +731,7 @@ def three_creeping_changed(seen, states, reals, d_seen, changed, out):
     _66 = _63 + d_kept * (((-(_17 * _28 - (0.5 * (_19 * _64)))) if _26 > most else (-_17))) + d_most * (((-(_19 * _65)) if _26 > most else 0.0))
     _67 = most * (_30 * (_27 * (2.0 * (_18 * _19) + 2.0 * (_21 * _22) + 2.0 * (_24 * _25))))
     _68 = s0 * _11  # d speed / d s0
-    _69 = (0.0 if _5 > 1.0 else (((_3 * _68) if _4 > 0.0 else 0.0)))  # d r / d s0
+    _69 = (0.0 if _5 > 1.0 else (((_3 * _68) if _4 > 0.0 else 0.0)))
     _70 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _69)) - (2.0 * (_7 * _69)))) - (_10 * (_53 * _68))) if _0 > transition else (-(_13 * (_14 * (_12 * _68)))))  # d factor / d s0
     _71 = _16 + s0 * _70  # d mu[0] / d s0
     _72 = pressing * (lever * _71) + kept * _71
@@ -742,7 +742,7 @@ def three_creeping_changed(seen, states, reals, d_seen, changed, out):
     _77 = most * (_30 * (_27 * (2.0 * (_19 * _72) + 2.0 * (_22 * _74) + 2.0 * (_25 * _76))))
     _78 = _66 + d_pressing * (((-(_18 * _28 - (0.5 * (_19 * _67)))) if _26 > most else (-_18))) + d_s0 * (((-(_28 * _72 - (0.5 * (_19 * _77)))) if _26 > most else (-_72)))
     _79 = s1 * _11  # d speed / d s1
-    _80 = (0.0 if _5 > 1.0 else (((_3 * _79) if _4 > 0.0 else 0.0)))  # d r / d s1
+    _80 = (0.0 if _5 > 1.0 else (((_3 * _79) if _4 > 0.0 else 0.0)))
     _81 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _80)) - (2.0 * (_7 * _80)))) - (_10 * (_53 * _79))) if _0 > transition else (-(_13 * (_14 * (_12 * _79)))))  # d factor / d s1
     _82 = s0 * _81  # d mu[0] / d s1
     _83 = pressing * (lever * _82) + kept * _82
@@ -752,7 +752,7 @@ def three_creeping_changed(seen, states, reals, d_seen, changed, out):
     _87 = pressing * (lever * _86) + kept * _86
     _88 = most * (_30 * (_27 * (2.0 * (_19 * _83) + 2.0 * (_22 * _85) + 2.0 * (_25 * _87))))
     _89 = s2 * _11  # d speed / d s2
-    _90 = (0.0 if _5 > 1.0 else (((_3 * _89) if _4 > 0.0 else 0.0)))  # d r / d s2
+    _90 = (0.0 if _5 > 1.0 else (((_3 * _89) if _4 > 0.0 else 0.0)))
     _91 = ((_11 * (_1 * (2.0 * (_8 * (_6 * _90)) - (2.0 * (_7 * _90)))) - (_10 * (_53 * _89))) if _0 > transition else (-(_13 * (_14 * (_12 * _89)))))  # d factor / d s2
     _92 = s0 * _91  # d mu[0] / d s2
     _93 = pressing * (lever * _92) + kept * _92
@@ -787,7 +787,7 @@ def three_sticking_loads(seen, states, reals, loads, rates):
     _2 = np.sqrt(1e-12 * (transition * transition) + s0 * s0 + s1 * s1 + s2 * s2)  # speed
     _3 = (_2 - transition) * (1.0 / (0.5 * transition))
     _4 = (_3 if _3 > 0.0 else 0.0)
-    _5 = (1.0 if _4 > 1.0 else _4)  # r
+    _5 = (1.0 if _4 > 1.0 else _4)
     _6 = _5 * _5 * (3.0 - (2.0 * _5))
     _7 = _1 - (_6 * _1)  # tau
     _8 = _2 * _0 * (1.0 / (static + (dynamic - static) * _6))  # fading
@@ -821,7 +821,7 @@ def three_sticking_slopes(seen, states, reals, slopes):
     _3 = 1.0 / (0.5 * transition)
     _4 = (_2 - transition) * _3
     _5 = (_4 if _4 > 0.0 else 0.0)
-    _6 = (1.0 if _5 > 1.0 else _5)  # r
+    _6 = (1.0 if _5 > 1.0 else _5)
     _7 = _6 * _6
     _8 = 3.0 - (2.0 * _6)
     _9 = _7 * _8
@@ -850,7 +850,7 @@ def three_sticking_slopes(seen, states, reals, slopes):
     _32 = 1.0 / _2
     _33 = s0 * _32  # d speed / d s0
     _34 = _13 * _13
-    _35 = (0.0 if _5 > 1.0 else (((_3 * _33) if _4 > 0.0 else 0.0)))  # d r / d s0
+    _35 = (0.0 if _5 > 1.0 else (((_3 * _33) if _4 > 0.0 else 0.0)))
     _36 = 2.0 * (_8 * (_6 * _35)) - (2.0 * (_7 * _35))
     _37 = _13 * (_0 * _33) - (_11 * (_34 * (_12 * _36)))  # d fading / d s0
     _38 = 1.0 - (z0 * _37)  # d rates[0] / d s0
@@ -865,7 +865,7 @@ def three_sticking_slopes(seen, states, reals, slopes):
     _47 = pressing * (lever * _46) + kept * _46
     _48 = most * (_30 * (_28 * (2.0 * (_18 * _41) - (2.0 * (_22 * _44)) - (2.0 * (_26 * _47)))))
     _49 = s1 * _32  # d speed / d s1
-    _50 = (0.0 if _5 > 1.0 else (((_3 * _49) if _4 > 0.0 else 0.0)))  # d r / d s1
+    _50 = (0.0 if _5 > 1.0 else (((_3 * _49) if _4 > 0.0 else 0.0)))
     _51 = 2.0 * (_8 * (_6 * _50)) - (2.0 * (_7 * _50))
     _52 = _1 * _51
     _53 = _13 * (_0 * _49) - (_11 * (_34 * (_12 * _51)))  # d fading / d s1
@@ -880,7 +880,7 @@ def three_sticking_slopes(seen, states, reals, slopes):
     _62 = pressing * (lever * _61) + kept * _61
     _63 = most * (_30 * (_28 * (2.0 * (_22 * _59) - (2.0 * (_18 * _56)) - (2.0 * (_26 * _62)))))
     _64 = s2 * _32  # d speed / d s2
-    _65 = (0.0 if _5 > 1.0 else (((_3 * _64) if _4 > 0.0 else 0.0)))  # d r / d s2
+    _65 = (0.0 if _5 > 1.0 else (((_3 * _64) if _4 > 0.0 else 0.0)))
     _66 = 2.0 * (_8 * (_6 * _65)) - (2.0 * (_7 * _65))
     _67 = _1 * _66
     _68 = _13 * (_0 * _64) - (_11 * (_34 * (_12 * _66)))  # d fading / d s2
@@ -951,7 +951,7 @@ def three_sticking_changed(seen, states, reals, d_seen, changed, out):
     _6 = 1.0 / (0.5 * transition)
     _7 = _5 * _6
     _8 = (_7 if _7 > 0.0 else 0.0)
-    _9 = (1.0 if _8 > 1.0 else _8)  # r
+    _9 = (1.0 if _8 > 1.0 else _8)
     _10 = _9 * _9
     _11 = 3.0 - (2.0 * _9)
     _12 = _10 * _11
@@ -1010,7 +1010,7 @@ def three_sticking_changed(seen, states, reals, d_seen, changed, out):
     _65 = deformation * (_2 * _2)
     _66 = 1.0 / _4
     _67 = transition * _66
-    _68 = (0.0 if _8 > 1.0 else (((_6 * (-1.0 + 1e-12 * _67) - (0.5 * (_5 * (_6 * _6)))) if _7 > 0.0 else 0.0)))  # d r / d transition
+    _68 = (0.0 if _8 > 1.0 else (((_6 * (-1.0 + 1e-12 * _67) - (0.5 * (_5 * (_6 * _6)))) if _7 > 0.0 else 0.0)))
     _69 = 2.0 * (_11 * (_9 * _68)) - (2.0 * (_10 * _68))
     _70 = _65 + _3 * _69 - (_12 * _65)
     _71 = 1e-12 * (_16 * (_1 * _67)) - (_14 * (_41 * (_15 * _69)))  # d fading / d transition
@@ -1044,7 +1044,7 @@ def three_sticking_changed(seen, states, reals, d_seen, changed, out):
     _99 = most * (_37 * (_34 * (2.0 * (_21 * _22) + 2.0 * (_26 * _27) + 2.0 * (_31 * _32))))
     _100 = _97 + d_most * (((-(_22 * _98)) if _33 > most else 0.0)) + d_pressing * (((-(_21 * _35 - (0.5 * (_22 * _99)))) if _33 > most else (-_21)))
     _101 = s0 * _66  # d speed / d s0
-    _102 = (0.0 if _8 > 1.0 else (((_6 * _101) if _7 > 0.0 else 0.0)))  # d r / d s0
+    _102 = (0.0 if _8 > 1.0 else (((_6 * _101) if _7 > 0.0 else 0.0)))
     _103 = 2.0 * (_11 * (_9 * _102)) - (2.0 * (_10 * _102))
     _104 = _16 * (_1 * _101) - (_14 * (_41 * (_15 * _103)))  # d fading / d s0
     _105 = 1.0 - (z0 * _104)  # d rates[0] / d s0
@@ -1059,7 +1059,7 @@ def three_sticking_changed(seen, states, reals, d_seen, changed, out):
     _114 = pressing * (lever * _113) + kept * _113
     _115 = most * (_37 * (_34 * (2.0 * (_22 * _108) - (2.0 * (_27 * _111)) - (2.0 * (_32 * _114)))))
     _116 = s1 * _66  # d speed / d s1
-    _117 = (0.0 if _8 > 1.0 else (((_6 * _116) if _7 > 0.0 else 0.0)))  # d r / d s1
+    _117 = (0.0 if _8 > 1.0 else (((_6 * _116) if _7 > 0.0 else 0.0)))
     _118 = 2.0 * (_11 * (_9 * _117)) - (2.0 * (_10 * _117))
     _119 = _3 * _118
     _120 = _16 * (_1 * _116) - (_14 * (_41 * (_15 * _118)))  # d fading / d s1
@@ -1075,7 +1075,7 @@ def three_sticking_changed(seen, states, reals, d_seen, changed, out):
     _130 = most * (_37 * (_34 * (2.0 * (_27 * _126) - (2.0 * (_22 * _123)) - (2.0 * (_32 * _129)))))
     _131 = _100 + d_s0 * (((-(_35 * _108 - (0.5 * (_22 * _115)))) if _33 > most else (-_108))) + d_s1 * (((_35 * _123 + 0.5 * (_22 * _130)) if _33 > most else _123))
     _132 = s2 * _66  # d speed / d s2
-    _133 = (0.0 if _8 > 1.0 else (((_6 * _132) if _7 > 0.0 else 0.0)))  # d r / d s2
+    _133 = (0.0 if _8 > 1.0 else (((_6 * _132) if _7 > 0.0 else 0.0)))
     _134 = 2.0 * (_11 * (_9 * _133)) - (2.0 * (_10 * _133))
     _135 = _3 * _134
     _136 = _16 * (_1 * _132) - (_14 * (_41 * (_15 * _134)))  # d fading / d s2
