@@ -72,6 +72,9 @@ def clearance_bearing(ints, reals, t, frames, states, inputs, want, work, wrench
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def clearance_bearing_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write the derivatives of the force along a change of the reals; arguments as of `CHANGED_SIG`."""
+    """Write the derivatives of the force along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     if D.bore_depth(frames[0], frames[1], reals) > 0.0:
         D.bore_changed(frames[0], frames[1], reals, changed, out)

@@ -22,8 +22,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gearmbs.dae.equations.loads.traced import Frame, changed, dot, kernels, seen_from
 from gearmbs.kernels.derive import ONE, ZERO, Function, Value, derivative, given, inputs, product, slopes, tangent
-from gearmbs.mechanism.forces.definitions import Frame, changed, dot, impact_forces, kernels, seen_from
+from gearmbs.mechanism.forces.definitions import impact_forces
 
 Numbers = Sequence[Value]
 

@@ -20,9 +20,9 @@ from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Setting, State
 from gearmbs.units import Quantity, to_si
 
-WORK = 340
+WORK = 1104
 """Places of the kernel's scratch that do not depend on the number of modes, and those a mode."""
-WORK_A_MODE = 9
+WORK_A_MODE = 8
 UNIT = 1e-3
 """Radial displacement by one unit of a state, m: the integrator then controls the rim as finely as contacts need."""
 
@@ -143,7 +143,7 @@ DEPTHS = {"penetration_drive": "m", "penetration_back": "m", "pairs_drive": "1",
 
 @dataclass(eq=False, repr=False)
 class RingMeshes(ForceElement):
-    """Meshes of all planets with a ring whose rim bends: see `gearmbs.contact.elastic_ring_kernel`.
+    """Meshes of all planets with a ring whose rim bends: see `gearmbs.contact.ring.kernel`.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ class RingMeshes(ForceElement):
     def compiled(self) -> Compiled:
         """Return kernel and tables."""
         from gearmbs.contact import GEAR_CONTACT_SIG, gear_contact
-        from gearmbs.contact.elastic_ring_kernel import ring_meshes
+        from gearmbs.contact.ring.kernel import ring_meshes
 
         modes, tables = self.modes, [pack(pair) for pair in self.pairs]
         m = modes.mass.size

@@ -41,7 +41,7 @@ def test_modes_of_a_free_rim():
 
 @pytest.mark.parametrize("planets", [1, 4])
 def test_derivatives_of_the_element(planets):
-    from gearmbs.contact.elastic_ring_kernel import ring_meshes as kernel
+    from gearmbs.contact.ring.kernel import ring_meshes as kernel
     from gearmbs.kernels.pointers import address
 
     gears = PlanetarySet(GEARS.sun, GEARS.planet, GEARS.ring, planets=planets, contact=GEARS.contact)

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearmbs.dae.equations.loads.traced import Frame, changed, cross, dot, kernels
 from gearmbs.kernels.derive import Function, given, inputs
-from gearmbs.mechanism.forces.definitions import Frame, changed, cross, dot, kernels
 
 
 def twist_of(one, two):

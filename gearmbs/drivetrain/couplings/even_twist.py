@@ -44,7 +44,10 @@ def even_twist(ints, reals, t, frames, states, inputs, want, work, wrench, rates
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def even_twist_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write the derivatives of the torque along a change of the reals; arguments as of `CHANGED_SIG`."""
+    """Write the derivatives of the torque along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     D.even_changed(frames[0], frames[1], reals, D.twist(frames[0], frames[1]), changed, out)
 
 

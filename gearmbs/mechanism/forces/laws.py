@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from gearmbs.dae.equations.loads.forces import Diagnostic
+from gearmbs.dae.equations.loads.traced import Frame
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels import PLAIN, derive
 from gearmbs.kernels.derive import ONE, ZERO, Function, Value, derivative, inputs, product, tangent
-from gearmbs.mechanism.forces.definitions import Frame
 
 _tracing = threading.Lock()
 _numbers = itertools.count()

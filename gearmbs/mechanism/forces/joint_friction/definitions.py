@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from gearmbs.dae.equations.loads.traced import Frame, dot, matrix, placed, rows, seen_from
 from gearmbs.kernels.derive import Function, Value, choose, inputs, tangent
-from gearmbs.mechanism.forces.definitions import Frame, dot, matrix, placed, rows, seen_from, step
+from gearmbs.mechanism.forces.definitions import step
 from gearmbs.mechanism.forces.joint_friction import BALL, NAMES, PIN, REALS
 
 Numbers = Sequence[Value]

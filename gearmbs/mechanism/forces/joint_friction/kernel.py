@@ -132,7 +132,10 @@ def pin_friction(ints, reals, t, frames, states, inputs, want, work, wrench, rat
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def pin_friction_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write its derivatives along a change of the reals; arguments as of `CHANGED_SIG`."""
+    """Write its derivatives along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     own = ints[0]
     other, sense = 1 - own, 1.0 - 2.0 * own
     reaction, seen, loads = rooms(inputs, work)
@@ -174,7 +177,10 @@ def slide_friction(ints, reals, t, frames, states, inputs, want, work, wrench, r
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def slide_friction_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write its derivatives along a change of the reals; arguments as of `CHANGED_SIG`."""
+    """Write its derivatives along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     reaction, seen, loads = rooms(inputs, work)
     moved = vector_at(work, SEEN_CHANGED, 4)
     D.slide_seen(frames, reaction, reals, seen)
@@ -214,7 +220,10 @@ def cylinder_friction(ints, reals, t, frames, states, inputs, want, work, wrench
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def cylinder_friction_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write its derivatives along a change of the reals; arguments as of `CHANGED_SIG`."""
+    """Write its derivatives along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     reaction, seen, loads = rooms(inputs, work)
     moved = vector_at(work, SEEN_CHANGED, 4)
     D.cylinder_seen(frames, reaction, reals, seen)
@@ -254,7 +263,10 @@ def ball_friction(ints, reals, t, frames, states, inputs, want, work, wrench, ra
 
 @njit(CHANGED_SIG, cache=True, nogil=True, error_model="numpy")
 def ball_friction_changed(ints, reals, changed, frames, states, inputs, work, out):
-    """Write its derivatives along a change of the reals; arguments as of `CHANGED_SIG`."""
+    """Write its derivatives along a change of the reals.
+
+    Arguments as of `CHANGED_SIG` in `gearmbs.dae.equations.loads.forces`.
+    """
     reaction, seen, loads = rooms(inputs, work)
     moved = vector_at(work, SEEN_CHANGED, 4)
     D.ball_seen(frames, reaction, reals, seen)
