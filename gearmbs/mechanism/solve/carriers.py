@@ -5,18 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from gearmbs.dae.equations.expressions import opcodes as op
-from gearmbs.dae.equations.expressions.tape import Tape, TapeBuilder
 from gearmbs.dae.problem import ModelError
 from gearmbs.mechanism.forces.springs import LineSpring, MatrixForce
 from gearmbs.mechanism.parts.bodies import Body, Marker
 from gearmbs.mechanism.parts.elements import COMPONENTS, ForceElement, Load
 from gearmbs.mechanism.parts.joints import Joint, kinds_with_angle
 from gearmbs.mechanism.parts.modal import ModalBody, centre_marker
+
+if TYPE_CHECKING:
+    from gearmbs.dae.equations.expressions.tape import Tape
 
 CARRIED = 0.1
 """Part of the centre distance by which a wheel may stand off the line about which what it is on turns, and turn of a
@@ -254,6 +256,9 @@ def error_tape(bodies: Sequence[int], turning: Sequence[int], still: Sequence[in
     element
         The mesh.
     """
+    # what expressions need is loaded by those who ask for some
+    from gearmbs.dae.equations.expressions.tape import TapeBuilder
+
     b, total = TapeBuilder(bodies), -1
     *both, pitch = levers(element)
     for i, j, lever in zip(turning, still, both, strict=True):
