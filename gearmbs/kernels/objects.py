@@ -7,6 +7,8 @@ Python, independent of where it is loaded, and for a processor that is named.
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
@@ -222,3 +224,33 @@ def _machine(codegen: Any, processor: str, triple: str) -> Any:
         llvm.initialize_all_asmprinters()
     target = llvm.Target.from_triple(triple or llvm.get_process_triple())
     return target.create_target_machine(cpu=name, features=features, opt=3, reloc="pic", codemodel="default")
+
+
+_ASK = """
+import sys
+import llvmlite.binding as llvm
+llvm.initialize_all_targets()
+llvm.initialize_all_asmprinters()
+triple = sys.argv[1] or llvm.get_process_triple()
+machine = llvm.Target.from_triple(triple).create_target_machine(cpu=sys.argv[2])
+module = llvm.parse_assembly("define double @f(double %x) { ret double %x }")
+module.triple = triple
+machine.emit_object(module)
+"""
+"""Of a processor that it does not know LLVM writes so and takes another, or ends the process: not this one."""
+
+
+def processors(triple: str) -> list[str]:
+    """Return the names that LLVM has for processors of a system's kind, those of others of its family among them."""
+    return re.findall(r"^  (\S+) +- Select the", _asked(triple, "help").stderr, re.MULTILINE)
+
+
+def is_processor(triple: str, name: str) -> bool:
+    """Return whether a name is that of a processor of a system's kind."""
+    done = _asked(triple, name)
+    return not done.returncode and "not a recognized processor" not in done.stderr
+
+
+def _asked(triple: str, processor: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", _ASK, triple, processor]
+    return subprocess.run(command, capture_output=True, text=True, check=False)

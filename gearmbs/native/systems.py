@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import platform
-import re
 import shutil
-import subprocess
 import sys
 from typing import NamedTuple
 
@@ -84,23 +82,13 @@ NATIVE = "native"
 """Stands for the processor of this machine."""
 LEVELS = {"x86_64": ("x86-64", "x86-64-v2", "x86-64-v3", "x86-64-v4"), "aarch64": ("generic", "cortex-a72")}
 """Processors that messages name, by the kind of machine."""
-_ASK = """
-import sys
-import llvmlite.binding as llvm
-llvm.initialize_all_targets()
-llvm.initialize_all_asmprinters()
-triple = sys.argv[1] or llvm.get_process_triple()
-machine = llvm.Target.from_triple(triple).create_target_machine(cpu=sys.argv[2])
-module = llvm.parse_assembly("define double @f(double %x) { ret double %x }")
-module.triple = triple
-machine.emit_object(module)
-"""
-"""Of a processor that it does not know LLVM writes so and takes another, or ends the process: not this one."""
 
 
 def processors_of(system: System) -> list[str]:
     """Return the names that LLVM has for processors of a system's kind, those of others of its family among them."""
-    return re.findall(r"^  (\S+) +- Select the", _asked_of_llvm(system, "help").stderr, re.MULTILINE)
+    from gearmbs.kernels.objects import processors
+
+    return processors(system.triple)
 
 
 def check_processor(name: str, system: System) -> None:
@@ -109,16 +97,12 @@ def check_processor(name: str, system: System) -> None:
     usual = LEVELS.get(machine, ())
     if name in (NATIVE, *usual):
         return
-    done = _asked_of_llvm(system, name)
-    if done.returncode or "not a recognized processor" in done.stderr:
+    from gearmbs.kernels.objects import is_processor
+
+    if not is_processor(system.triple, name):
         known = [one for one in (NATIVE, *usual, *processors_of(system)) if one != name]
         meant = did_you_mean(name, known, otherwise=f"choose {any_of(list(dict.fromkeys(known)))}", count=3)
         raise ModelError(f"processor = {name!r}: {machine} has none of this name that it runs on; {meant}")
-
-
-def _asked_of_llvm(system: System, processor: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", _ASK, system.triple, processor]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def c_compiler(given: str | None, system: System = SYSTEMS["linux"]) -> list[str]:

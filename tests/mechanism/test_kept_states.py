@@ -74,6 +74,20 @@ def test_equations_of_an_earlier_run_are_the_same(lump):
         mechanism.simulate(0.01, assembled=two, lump=lump, **SETTINGS)
 
 
+def test_equations_of_another_mechanism_or_set_up_otherwise_are_refused():
+    mechanism = case_mechanism(CASE)
+    _, first = streamed(mechanism, 0.002, lump=False)
+    with pytest.raises(ModelError, match=says("assembled", "another mechanism")):
+        case_mechanism(CASE.changed(operation={"torque": 100.0})).simulate(
+            0.002, assembled=first, lump=False, **SETTINGS
+        )
+    for name, value in {"formulation": "SI1", "rate_scale": 1000.0, "lump": True}.items():
+        with pytest.raises(ModelError, match=says("assembled", name)):
+            mechanism.simulate(0.002, assembled=first, **{**SETTINGS, "lump": False, name: value})
+    again = mechanism.simulate(0.002, every_step=True, assembled=first, lump=False, **SETTINGS)
+    np.testing.assert_array_equal(again.result.y[-1], first.result.y[-1])
+
+
 @pytest.mark.parametrize("lump", [True, False])
 def test_a_state_is_one_of_wheels_with_other_slices_too(lump):
     """Slices are a number in the tables: unknowns and places are the same."""

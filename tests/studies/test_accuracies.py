@@ -10,7 +10,7 @@ from gearmbs.gears import planetary
 from gearmbs.studies import CaseError, run_train, train_modes
 from gearmbs.studies.mode_accuracy import frequency_errors
 from gearmbs.studies.planetary import PlanetaryRun, run_planetary
-from gearmbs.studies.train_accuracy import Lines, Precise, accurate_lines, errors_of, time_apart
+from gearmbs.studies.train_accuracy import FLOOR, Lines, Precise, accurate_lines, errors_of, time_apart
 from tests.says import says
 from tests.studies.test_steady import train
 
@@ -33,9 +33,9 @@ GROUPS = np.zeros(2, dtype=int)
 def test_the_largest_difference_of_a_mesh_counts_for_all_its_harmonics():
     errors = errors_of(lines(LEVELS), lines([100.8, 50.0, 10.0, 1.0, 1.0, 1.0]), GROUPS, 0.5)
     np.testing.assert_allclose(errors.whole[0, 0], 0.4)
-    # one signal is a hundredth of the other: it is judged as if it had that, and 2e-4 is told at least
+    # one signal is a hundredth of the other: it is judged as if it had that, and the floor is told at least
     np.testing.assert_allclose(errors.largest[:, 0, 0], [100.0, 1.0])
-    np.testing.assert_allclose(errors.whole[1, 0], 2e-4)
+    np.testing.assert_allclose(errors.whole[1, 0], FLOOR)
     assert not errors.drift.any()
 
 

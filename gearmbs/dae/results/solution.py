@@ -100,6 +100,8 @@ class Solution(Measured, Shown):
 
     inside: Mapping[float, float] = MappingProxyType({})
     jumped: frozenset[float] = frozenset()
+    set_up: Mapping[str, Any] = MappingProxyType({})
+    """Formulation, rate scale and lumping by which `simulate` has set up the equations, once it has."""
     at_steps: Mapping[tuple[str, str], Any] = MappingProxyType({})
     """What is read of the integrator's own steps instead of evaluated, by method and name; see `watched.Watch`."""
 
@@ -584,8 +586,7 @@ class Solution(Measured, Shown):
         return self.t.size
 
     def __repr__(self) -> str:
-        mechanism = getattr(self.system, "mechanism", None)
-        name = mechanism.name if mechanism is not None else "mechanism"
+        name = getattr(getattr(self.system, "mechanism", None), "name", "mechanism")
         return (
             f"Solution({name!r}: {self.t.size} times from {self.t[0]:g} to {self.t[-1]:g} s, "
             f"{self.status.name}; {self.stats})" + (f"\n{self.remark}" if self.remark else "")

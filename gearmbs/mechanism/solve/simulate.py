@@ -279,12 +279,13 @@ def simulate(
     # 2. the equations, and where they start and end
     asked, lump = bool(lump) or assembled is not None, mechanism.lump and not stops if lump is None else lump
     t_model = t_start if initial is None else initial.t_model
+    set_up = {"formulation": formulation, "rate_scale": rate_scale, "lump": lump}
     if assembled is None:
         system, problem, members, lumping = prepared(
             mechanism, t_model, lump, formulation, rate_scale, continued or initial is not None
         )
     else:
-        system, problem, members, lumping = _taken_over(assembled, t_model)
+        system, problem, members, lumping = _taken_over(assembled, mechanism, set_up, t_model)
     if initial is not None:
         # events in what is left of the last step would be missed
         problem = _from_state(
@@ -321,7 +322,7 @@ def simulate(
     # 4. what they say
     solution = Solution(system, problem, result, members, remark)
     solution.inside = just_inside(t_eval)
-    solution.initial = initial
+    solution.initial, solution.set_up = initial, set_up
     if stream is not None:
         return _closed(stream, solution, name)
     if held and moves_after_all(mechanism, solution):
@@ -331,13 +332,25 @@ def simulate(
     return solution
 
 
-def _taken_over(run: Solution, t_model: float) -> tuple[System, DAEProblem, Members | None, str]:
-    """Return what `_prepared` has returned for an earlier run, which began as it was assembled."""
+def _taken_over(
+    run: Solution, mechanism: Mechanism, set_up: Mapping[str, Any], t_model: float
+) -> tuple[System, DAEProblem, Members | None, str]:
+    """Return what `_prepared` has returned for an earlier run of this mechanism, which began as it was assembled."""
+    if run.system.mechanism is not mechanism:
+        raise ModelError(
+            f"assembled: its run is of another mechanism, {getattr(run.system.mechanism, 'name', None)!r}; give a run "
+            f"of this very one, {mechanism.name!r}, or leave assembled away"
+        )
     if run.initial is not None or run.problem.t0 != t_model:
         raise ModelError(
             f"assembled: its run starts at {run.problem.t0:g} s{' in a state' if run.initial is not None else ''}, the "
             f"model is one for {t_model:g} s; give a run from the time at which this one, or its state's, started"
         )
+    for name, asked in set_up.items():
+        if run.set_up.get(name) != asked:
+            raise ModelError(
+                f"assembled: its run has {name} = {run.set_up.get(name)!r}, this one {asked!r}; give both the same"
+            )
     return run.system, run.problem, run.members, run.remark
 
 
