@@ -396,8 +396,8 @@ class ControlledDrive(Drive):
 
     kind: ClassVar[str] = "controlled"
 
-    proportional: Positive
-    integral: Positive
+    proportional: Annotated[Quantity, Measure("N*m*s/rad", above=0)]
+    integral: Annotated[Quantity, Measure("N*m/rad", above=0)]
     largest: Annotated[Quantity, Measure("torque", above=0)]
     reference: Any = None
 

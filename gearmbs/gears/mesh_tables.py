@@ -246,12 +246,16 @@ def _edge(beyond: Callable[[float], bool], force: Callable[[float], float], low:
 
 
 def _lags(yielding: float, far: float, other: float, work: float, count: int) -> np.ndarray:
-    """Return deflections, m: equally spaced into either flank from where the first tooth touches, what is between them
-    free."""
+    """Return deflections, m: into either flank from where the first tooth touches, what is between them free.
+
+    Their squares, of an even row, so that torques far below the largest have many of them.
+    """
+    into = np.linspace(0.0, 1.0, count) ** 2
     if work <= other:
         # somewhere there is no room between the flanks, as of teeth without backlash at zero
-        return np.union1d(np.linspace(far, 0.0, count), np.linspace(min(other, 0.0), yielding, count))
-    flanks = [np.linspace(far, other, count), np.linspace(work, yielding, count)]
+        low = min(other, 0.0)
+        return np.union1d(far * into, low + (yielding - low) * into)
+    flanks = [other + (far - other) * into, work + (yielding - work) * into]
     return np.union1d(np.concatenate(flanks), [0.5 * (other + work), 0.0])
 
 

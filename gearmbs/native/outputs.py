@@ -194,10 +194,11 @@ class Finder:
         if not (turns if what == "joint_angle" else found.kind in kinds_with_displacement() or what == "joint_rate"):
             raise ValueError(f"joint {joint!r} is {found.kind}")
         i, j = found.i.name, found.j.name
+        along = f'VZ("{i}", "{j}", "{j}", "{j}")'
         text, unit = {
-            "joint_angle": (f"AZ({i}, {j})", "rad"),
-            "joint_displacement": (f"DZ({i}, {j}, {j})", "m"),
-            "joint_rate": (f"WZ({i}, {j}, {j})", "rad/s") if turns else (f"VZ({i}, {j}, {j}, {j})", "m/s"),
+            "joint_angle": (f'AZ("{i}", "{j}")', "rad"),
+            "joint_displacement": (f'DZ("{i}", "{j}", "{j}")', "m"),
+            "joint_rate": (f'WZ("{i}", "{j}", "{j}")', "rad/s") if turns else (along, "m/s"),
         }[what]
         return self.evaluate(name, text)._replace(unit=unit)
 
@@ -240,7 +241,7 @@ class Finder:
         if not isinstance(found.body, ModalBody):
             raise ValueError(f"marker {found.name!r} is on '{found.body.name}', which does not deform")
         shapes, c = found.body.shape_at(found)[component // 3], component % 3
-        terms = [f"{float(one)!r}*MODAL({found.body.name}, {k})" for k, one in enumerate(shapes[:, c], start=1)]
+        terms = [f'{float(one)!r}*MODAL("{found.body.name}", {k})' for k, one in enumerate(shapes[:, c], start=1)]
         return self.evaluate(name, " + ".join(terms))._replace(unit="m" if component < 3 else "rad")
 
     def _error(self, name: str, mesh: str) -> Told:

@@ -127,4 +127,6 @@ def c_compiler(given: str | None, system: System = SYSTEMS["linux"]) -> list[str
             pass
     tried = given or ", ".join(command[0] for command in own)
     remedy = "gcc or clang" if not system.triple else "a compiler for that system"
-    raise ModelError(f"compiler: {tried} was not found; install {remedy}, or the package ziglang (pip install ziglang)")
+    raise ModelError(
+        f"compiler: {tried} was not found; install {remedy}, or the package ziglang (pip install 'gearmbs[link]')"
+    )

@@ -111,6 +111,15 @@ def test_controlled_drive_holds_its_speed_under_load():
     assert torque.max() <= 80.0
 
 
+def test_gains_of_a_controlled_drive_have_their_units():
+    drive = ControlledDrive(
+        name="motor", shaft="rotor", speed=100.0, proportional="5 N m s/rad", integral="40 N m/rad", largest=80.0
+    )
+    assert (drive.proportional, drive.integral) == (5.0, 40.0)
+    with pytest.raises(DrivetrainError, match=says("proportional", "5 N", "s/rad")):
+        ControlledDrive(name="motor", shaft="rotor", speed=100.0, proportional="5 N", integral=40.0, largest=80.0)
+
+
 def test_curve_and_torque_drives():
     curve = CurveMotor(name="m", shaft="rotor", speed=50.0, speeds=(0.0, 50.0, 100.0), torques=(40.0, 30.0, 0.0))
     for speed, torque in ((0.0, 40.0), (50.0, 30.0), (100.0, 0.0)):

@@ -39,6 +39,9 @@ def test_the_table_of_forces_is_the_inverse_of_the_transmission_error(internal, 
     found = between(table, 170.0 / table.base_radii[1])
     # linear pieces of a curve that is all but straight: a part in some thousands
     np.testing.assert_allclose(found, exact.error, rtol=2e-3)
+    # of a hundredth of the largest torque, too
+    small = loaded_transmission_error(geared, "3 N m", 20)
+    np.testing.assert_allclose(between(table, 3.0 / table.base_radii[1]), small.error, rtol=2e-3)
     assert np.array_equal(table.error[0], loaded_transmission_error(geared, "100 N m", 20).error)
     # nothing touches within the backlash, and the other flanks push back behind it
     inside = (table.deflection < 0.0) & (table.deflection > -geared.geometry.normal_backlash)

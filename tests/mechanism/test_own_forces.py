@@ -351,6 +351,12 @@ def uses_objects(t, frames, states, parameters, wrench, rates, diagnostics):
     wrench[0, 0] = float(Mechanism is not None)
 
 
+def imports(t, frames, states, parameters, wrench, rates, diagnostics):
+    import math
+
+    wrench[0, 0] = math.sin(t)
+
+
 def halved(x):
     return 0.5 * x
 
@@ -376,6 +382,7 @@ def rate_not_finite(t, frames, states, parameters, wrench, rates, diagnostics):
         (adds_text, {"parameters": [1.0]}, "its kernel fails with (UFunc|Type)"),
         (answers, {}, "its kernel returns 3.0; let it write"),
         (uses_objects, {}, "numba cannot compile kernel.*hand over what else it needs"),
+        (imports, {}, "numba cannot compile kernel.*IMPORT_NAME"),
         (calls_a_plain_function, {}, "kernel.*halved.*numba.njit"),
         (nothing, {"parameters": {"stiffness": np.nan}}, "parameter stiffness = nan; give a finite number"),
         (nothing, {"parameters": ["a"]}, "give numbers, one a parameter"),

@@ -330,6 +330,13 @@ def _check_arguments(label: str, what: str, function: Any, expected: tuple[str, 
         ) from None
 
 
+def _of_bytecode() -> tuple[type[Exception], ...]:
+    """Return numba's error of a statement that it does not know, as an import, which is none of its other errors."""
+    from numba.core.errors import UnsupportedBytecodeError
+
+    return (UnsupportedBytecodeError,)
+
+
 def _compiled(label: str, what: str, function: Any, signature: Any, expected: tuple[str, ...]) -> Any:
     """Return a function compiled for a signature; a division by zero gives no number and raises nothing."""
     python = getattr(function, "py_func", function)
@@ -338,7 +345,7 @@ def _compiled(label: str, what: str, function: Any, signature: Any, expected: tu
     try:
         dispatcher.compile(signature.args)
         found = dispatcher.overloads[signature.args].signature.return_type
-    except (CompilationError, KeyError, TypeError, RuntimeError) as error:
+    except (CompilationError, *_of_bytecode(), KeyError, TypeError, RuntimeError) as error:
         lines = [line for line in str(error).splitlines() if line.strip()]
         text = "\n".join(lines[:8])
         outside = inspect.getclosurevars(python)

@@ -45,6 +45,21 @@ void *NRT_Allocate(size_t size) {
 
 void NRT_Free(void *memory) { free(memory); }
 
+#if defined(__GLIBC__) && defined(__x86_64__)
+/* Of some functions glibc has versions of later years, which differ in how errors are told: with those of the first a
+   library runs where glibc is older than where it was linked. */
+#define OF_THE_FIRST(name, told, given)                                                                                \
+    double gearmbs_##name told;                                                                                        \
+    __asm__(".symver gearmbs_" #name ", " #name "@GLIBC_2.2.5");                                                       \
+    double name told { return gearmbs_##name given; }
+OF_THE_FIRST(hypot, (double x, double y), (x, y))
+OF_THE_FIRST(pow, (double x, double y), (x, y))
+OF_THE_FIRST(exp, (double x), (x))
+OF_THE_FIRST(exp2, (double x), (x))
+OF_THE_FIRST(log, (double x), (x))
+OF_THE_FIRST(log2, (double x), (x))
+#endif
+
 double numba_nextafter(double x, double y) { return nextafter(x, y); }
 
 /* Write the strides of a contiguous array in another shape; return 0 for one that is not contiguous. */
