@@ -330,11 +330,12 @@ def _check_arguments(label: str, what: str, function: Any, expected: tuple[str, 
         ) from None
 
 
-def _of_bytecode() -> tuple[type[Exception], ...]:
-    """Return numba's error of a statement that it does not know, as an import, which is none of its other errors."""
+def _refusals() -> tuple[type[Exception], ...]:
+    """Return what is raised of a function that cannot be compiled."""
+    # of a statement that numba does not know, as an import: none of its other errors
     from numba.core.errors import UnsupportedBytecodeError
 
-    return (UnsupportedBytecodeError,)
+    return CompilationError, UnsupportedBytecodeError, KeyError, TypeError, RuntimeError
 
 
 def _compiled(label: str, what: str, function: Any, signature: Any, expected: tuple[str, ...]) -> Any:
@@ -345,7 +346,7 @@ def _compiled(label: str, what: str, function: Any, signature: Any, expected: tu
     try:
         dispatcher.compile(signature.args)
         found = dispatcher.overloads[signature.args].signature.return_type
-    except (CompilationError, *_of_bytecode(), KeyError, TypeError, RuntimeError) as error:
+    except _refusals() as error:
         lines = [line for line in str(error).splitlines() if line.strip()]
         text = "\n".join(lines[:8])
         outside = inspect.getclosurevars(python)
