@@ -332,6 +332,9 @@ class DAEProblem:
         the stiffness of the modes, so that a corrector converges without them.
     couplings : ndarray of bool, optional
         Entries of the pattern between the modes of a body: small ones of these are left out first.
+    modes : ndarray of int64, shape (4 m,), optional
+        Of each modal coordinate the places of its momentum, velocity and coordinate, whose equations p' = Q, p = M v
+        and v = q' stand in the same places, and the number of its body; body by body.
     finite_rates : bool
         Whether no equation makes a rate infinite: steps are not looked at for poles that they have got over then, which
         costs two evaluations wherever an unknown turns against its prediction.
@@ -386,6 +389,7 @@ class DAEProblem:
     jacobian_residuals: int = 0
     small_entries: bool = False
     couplings: np.ndarray | None = None
+    modes: np.ndarray | None = None
     finite_rates: bool = False
     solved_at_outputs: np.ndarray | None = None
     solved_if_needed: np.ndarray | None = None

@@ -18,7 +18,7 @@ from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.integrators.stepping.jumps import TERMS
 from gearmbs.dae.linalg.entry_lists import NEGLIGIBLE, NEGLIGIBLE_IN_NEWTON
 from gearmbs.dae.linalg.left_out import signs_of_error
-from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse, new_lines
+from gearmbs.dae.linalg.lu_plan import NO_MODES, LUPlan, SingularMatrixError, analyse, new_lines
 from gearmbs.dae.linalg.sparse_lu import LUFactors, new_factors
 from gearmbs.dae.model.evaluator import new_records, pattern
 from gearmbs.dae.problem import INPUT, DAEProblem, Number
@@ -51,6 +51,13 @@ OF_TAIL = (
     "last_to", "part_ptr", "part_at", "part_col", "above_ptr", "above_col", "above_at",
 )  # fmt: skip
 """Arrays of a plan with a dense tail."""
+OF_MODES = (
+    "groups", "mode_at", "row_at", "column_at", "fill_at", "fill_src", "rest_src", "rest_scale", "schur_at",
+    "schur_scale",
+)  # fmt: skip
+"""Arrays of a plan with condensed modes."""
+OF_KNOWN = ("blocks", "above", "lower", "rest", "every", "left", "reduced", "moving")
+"""Arrays of factors that have room for twice what those of known plans take."""
 OF_MATRIX = ("a_pos", "a_src", "a_scale", "a_to", "left_src", "left_limit", "limit")
 OF_FACTORS = ("u_pos", "u_col", "l_pos", "l_col", "l_to", "l_by", "u_to", "u_by", "div_to", "div_by")
 OF_OPERATIONS = ("op_to", "op_l", "op_u")
@@ -127,8 +134,9 @@ def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], fun
     matrix = run.indptr, run.indices, run.scale, run.counted
     assert run.plan is not None
     assert run.factors is not None
-    others, couplings = _other_plans(run), begun.problem.couplings
-    own = _factored(image, run.plan, run.factors, *matrix, others, begun.problem.small_entries, couplings)
+    others, problem = _other_plans(run), begun.problem
+    between = problem.couplings, problem.modes
+    own = _factored(image, run.plan, run.factors, *matrix, others, problem.small_entries, *between)
     driver = _driver(begun, numbers)
     parts["driver"] = image.struct(driver, STATE, {"scratch": SCRATCH, **dict.fromkeys(_FIXED, CONSTANT)})
     for kernel in BY_ADDRESS:
@@ -136,7 +144,7 @@ def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], fun
     asked = expressions_of(begun.system, told)
     teller, plan, indptr, indices = _teller(begun, told, asked)
     ones, counted = np.ones(indptr.size - 1), np.zeros(indices.size)
-    found = _factored(image, plan, new_factors(plan), indptr, indices, ones, counted, [], False, None)
+    found = _factored(image, plan, new_factors(plan), indptr, indices, ones, counted, [], False, None, None)
     kinds = {**dict.fromkeys(_RECORDS, SCRATCH), **dict.fromkeys(_ASKED, CONSTANT)}
     if not asked.starts.size:
         # of the point before nothing is asked
@@ -256,17 +264,17 @@ def _other_plans(run: Run) -> list[LUPlan]:
             plans.append(
                 analyse(
                     run.indptr, run.indices, st.matrix, run.scale, 0.0, counted, negligible, with_tail=True,
-                    couplings=run.problem.couplings,
+                    couplings=run.problem.couplings, modes=run.problem.modes,
                 )
             )  # fmt: skip
     with contextlib.suppress(SingularMatrixError):
-        plans.append(analyse(run.indptr, run.indices, st.matrix, run.scale, with_tail=True))
+        plans.append(analyse(run.indptr, run.indices, st.matrix, run.scale, with_tail=True, modes=run.problem.modes))
     return plans
 
 
 def _room_for(name: str, n: int, entries: int, present: int) -> int:
     """Return how long an array of a plan may become; ``present`` is the length of the longest that is known."""
-    if name in OF_TAIL:
+    if name in OF_TAIL or name in OF_MODES:
         return FILL * present
     if name in PER_COLUMN:
         wanted = n + 1
@@ -283,7 +291,7 @@ def _room_for(name: str, n: int, entries: int, present: int) -> int:
 
 def _factored(
     image: Image, plan: LUPlan, factors: LUFactors, indptr: np.ndarray, indices: np.ndarray, scale: np.ndarray,
-    counted: np.ndarray, others: list[LUPlan], with_tail: bool, couplings: np.ndarray | None,
+    counted: np.ndarray, others: list[LUPlan], with_tail: bool, couplings: np.ndarray | None, modes: np.ndarray | None,
 ) -> _Factored:  # fmt: skip
     """Take in a plan and its factors, with room for others of the same matrix, among them some that are known."""
     n, entries = len(indptr) - 1, len(indices)
@@ -304,9 +312,7 @@ def _factored(
         image.address_of(plan_part, word_of(plan, name), image.array(pools[kind], STATE), inside)
     own = {name: getattr(factors, name) for name in type(factors).array_members}
     known = [factors, *map(new_factors, others)]
-    sizes_of = {
-        name: FILL * max(getattr(one, name).size for one in known) for name in ("blocks", "above", "lower", "rest")
-    }
+    sizes_of = {name: FILL * max(getattr(one, name).size for one in known) for name in OF_KNOWN}
     sizes_of |= {"lu": max(2 * FILL * entries + n + 1, factors.lu.size), "x": n + LANES}
     for name, length in sizes_of.items():
         larger = np.zeros(length)
@@ -326,12 +332,13 @@ def _factored(
         ints=pools["i8"],
         places=pools["u4"],
         numbers=pools["f8"],
-        **{name: own[name] for name in ("lu", "x", "w", "blocks", "above", "lower", "rest")},
+        **{name: own[name] for name in type(factors).array_members if name != "pivot_inv"},
         indptr=np.asarray(indptr, dtype=np.int64),
         indices=np.asarray(indices, dtype=np.int64),
         scale=np.asarray(scale, dtype=float),
         counted=np.asarray(counted).astype(np.int64),
         couplings=np.zeros(0, dtype=np.int64) if couplings is None else couplings.astype(np.int64),
+        modes=NO_MODES if modes is None else modes,
         signs=signs_of_error(n),
     )
     part = image.record(room, STATE)
@@ -340,7 +347,7 @@ def _factored(
         "factor_words": (factors_part, word_of(factors, "lu")),
         "head": (plan_part, member_of(LUPlan, "tail")),
     }
-    fixed = ("at", "room", "factor_room", "indptr", "indices", "scale", "couplings", "signs")
+    fixed = ("at", "room", "factor_room", "indptr", "indices", "scale", "couplings", "modes", "signs")
     for name in type(room).array_members:
         number, inside = aliases.get(name, (-1, 0))
         if number < 0:

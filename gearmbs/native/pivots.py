@@ -8,14 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 from gearmbs.dae.integrators.driver import DROP_ROUNDS_ALLOWED, DROP_TOLERANCES, SINGULAR_RETRIES
+from gearmbs.dae.linalg.condensed_lists import numbers_of
 from gearmbs.dae.linalg.entry_lists import (
     COUPLING_LIMIT,
+    COUPLING_WHEN_PLANNED,
     FEWEST_ENTRIES,
     LEAVING_PLANS,
     NEGLIGIBLE,
     NEGLIGIBLE_IN_NEWTON,
     STEPS_A_PLAN,
-    WHEN_PLANNED,
 )
 from gearmbs.dae.linalg.left_out import converges_without
 from gearmbs.dae.linalg.lu_plan import LUPlan, parity, scale_and_choose
@@ -46,11 +47,12 @@ RETRY = 1
     A_PTR, A_POS, A_SRC, A_SCALE, TAIL_AT, TAIL_SRC, TAIL_SCALE, U_PTR, U_POS, L_PTR, L_POS, U_COL, L_COL, BLOCK_COL,
     LANE_PTR, ACT_PTR, ACT_TO, ACT_BY, ACT_U, LAST_PTR, LAST_TO, PART_PTR, PART_AT, PART_COL, ABOVE_PTR, ABOVE_COL,
     ABOVE_AT, L_TO, L_BY, U_TO, U_BY, A_TO, PIVOT_PTR, PIVOT_ORDER, OP_PTR, OP_TO, OP_L, OP_U, DIV_PTR, DIV_TO, DIV_BY,
-    NODE_END, ROW_FROM, COL_TO, ROW_SCALE, COL_SCALE, KEPT, LEFT_SRC, LEFT_LIMIT, LIMIT,
+    NODE_END, ROW_FROM, COL_TO, ROW_SCALE, COL_SCALE, KEPT, GROUPS, MODE_AT, ROW_AT, COLUMN_AT, FILL_AT, FILL_SRC,
+    REST_SRC, REST_SCALE, SCHUR_AT, SCHUR_SCALE, LEFT_SRC, LEFT_LIMIT, LIMIT,
 ) = range(len(LUPlan.array_members))  # fmt: skip
 """Arrays of a plan in their order; each has two words, address and length."""
 assert LUPlan.array_members.keys() == {*LISTS, "left_src", "left_limit", "limit"}
-LU, _, X, _, BLOCKS, ABOVE, LOWER, REST = range(len(LUFactors.array_members))
+LU, _, X, _, BLOCKS, ABOVE, LOWER, REST, EVERY, LEFT, REDUCED, MOVING = range(len(LUFactors.array_members))
 """The same of factors."""
 
 
@@ -69,7 +71,7 @@ class PlanRoom(Struct):
         How long each array of the factors may become.
     ints, places, numbers : ndarray
         Memory of the arrays by their type.
-    lu, x, w, blocks, above, lower, rest : ndarray
+    lu, x, w, blocks, above, lower, rest, every, left, reduced, moving : ndarray
         Memory of factors.
     indptr, indices, scale : ndarray
         As of `gearmbs.dae.linalg.lu_plan.analyse`.
@@ -77,6 +79,8 @@ class PlanRoom(Struct):
         Entries that have counted in any matrix before.
     couplings : ndarray of int64
         As of `gearmbs.dae.linalg.lu_plan.analyse`; empty for none.
+    modes : ndarray of int64
+        As of `gearmbs.dae.linalg.lu_plan.analyse`.
     signs : ndarray
         Of `gearmbs.dae.linalg.left_out.signs_of_error`.
     with_tail : bool
@@ -101,11 +105,16 @@ class PlanRoom(Struct):
     above: Vector
     lower: Vector
     rest: Vector
+    every: Vector
+    left: Vector
+    reduced: Vector
+    moving: Vector
     indptr: IntVector
     indices: IntVector
     scale: Vector
     counted: IntVector
     couplings: IntVector
+    modes: IntVector
     signs: Vector
 
 
@@ -125,7 +134,7 @@ def _put(room, k, into, items):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _put_lists(
-    d, room, with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices
+    d, room, with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices, apart
 ):
     """Write all that follows from pivots into the room of a plan; return whether it fits.
 
@@ -133,7 +142,7 @@ def _put_lists(
     ----------
     d, room
         As of `write_plan`.
-    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices
+    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices, apart
         As of `gearmbs.dae.linalg.plan_lists.lists_of_plan`.
     """
     (
@@ -141,8 +150,9 @@ def _put_lists(
         u_col, l_col, block_col, lane_ptr, act_ptr, act_to, act_by, act_u, last_ptr, last_to, part_ptr, part_at,
         part_col, above_ptr, above_col, above_at, l_to, l_by, u_to, u_by, a_to, pivot_ptr, pivot_order, op_ptr, op_to,
         op_l, op_u, div_ptr, div_to, div_by, node_end, row_from, col_to, row_scale, col_scale, kept,
+        groups, mode_at, row_at, column_at, fill_at, fill_src, rest_src, rest_scale, schur_at, schur_scale,
     ) = lists_of_plan_at(d.lists_of_plan)(
-        with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices
+        with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, by_row, by_col, taken, indptr, indices, apart
     )  # fmt: skip
     n = rows.shape[0]
     padded = (n - tail + LANES - 1) // LANES * LANES
@@ -150,6 +160,14 @@ def _put_lists(
     sizes[LU], sizes[X] = l_pos.shape[0] + u_pos.shape[0] + n + 1, tail + padded
     sizes[BLOCKS], sizes[ABOVE] = LANES * block_col.shape[0] + padded * (n - tail), LANES * above_col.shape[0]
     sizes[LOWER], sizes[REST] = padded * (n - tail) + LANES, padded
+    if apart.shape[0] > 0:
+        sizes[EVERY], sizes[LEFT] = numbers_of(groups), rest_src.shape[0]
+        sizes[MOVING] = fill_src.shape[0] + rest_src.shape[0] + 2
+        # the last of the values that are left is the one of the modes' diagonal
+        for e in range(a_src.shape[0]):
+            sizes[REDUCED] = max(sizes[REDUCED], np.int64(a_src[e]) + 1)
+        for e in range(tail_src.shape[0]):
+            sizes[REDUCED] = max(sizes[REDUCED], np.int64(tail_src[e]) + 1)
     fits = True
     for k in range(sizes.shape[0]):
         fits &= sizes[k] <= room.factor_room[k]
@@ -176,10 +194,15 @@ def _put_lists(
     fits = fits and _put(room, DIV_BY, room.places, div_by) and _put(room, NODE_END, room.ints, node_end)
     fits = fits and _put(room, ROW_FROM, room.places, row_from) and _put(room, COL_TO, room.places, col_to)
     fits = fits and _put(room, ROW_SCALE, room.numbers, row_scale) and _put(room, COL_SCALE, room.numbers, col_scale)
-    fits = fits and _put(room, KEPT, room.numbers, kept)
+    fits = fits and _put(room, KEPT, room.numbers, kept) and _put(room, GROUPS, room.ints, groups)
+    fits = fits and _put(room, MODE_AT, room.places, mode_at) and _put(room, ROW_AT, room.places, row_at)
+    fits = fits and _put(room, COLUMN_AT, room.places, column_at) and _put(room, FILL_AT, room.places, fill_at)
+    fits = fits and _put(room, FILL_SRC, room.places, fill_src) and _put(room, REST_SRC, room.places, rest_src)
+    fits = fits and _put(room, REST_SCALE, room.numbers, rest_scale) and _put(room, SCHUR_AT, room.places, schur_at)
+    fits = fits and _put(room, SCHUR_SCALE, room.numbers, schur_scale)
     if fits:
         room.head[0], room.head[1] = tail, u_tail
-        for k in (LU, X, BLOCKS, ABOVE, LOWER, REST):
+        for k in (LU, X, BLOCKS, ABOVE, LOWER, REST, EVERY, LEFT, REDUCED, MOVING):
             room.factor_words[2 * k + 1] = sizes[k]
         room.lu[:] = 0.0
         room.x[:] = 0.0
@@ -188,6 +211,9 @@ def _put_lists(
         room.above[:] = 0.0
         room.lower[:] = 0.0
         room.rest[:] = 0.0
+        room.every[:] = 0.0
+        if sizes[REDUCED] > 0:
+            room.reduced[sizes[REDUCED] - 1], room.moving[0] = 1.0, -1.0
     return fits
 
 
@@ -223,16 +249,18 @@ def write_plan(d, room, columns, rows_left, whole, drop, leaves, keeps, negligib
         for p in range(entries):
             counted[p] = room.counted[p] != 0
     spares = room.couplings.shape[0] > 0 and negligible >= NEGLIGIBLE_IN_NEWTON[0]
-    vals = whole.copy()
+    vals, modes = whole.copy(), room.modes if drop == 0.0 else room.modes[:0]
     while True:
         if spares:
             for p in range(entries):
                 spared[p] = room.couplings[p] != 0 and not counted[p]
                 vals[p] = 0.0 if spared[p] else whole[p]
         (
-            rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, limits,
+            rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, apart,
+            left, limits,
         ) = scale_and_choose_at(d.scale_and_choose)(
-            room.indptr, room.indices, vals, room.scale, max(drop, CANCELLED), counted, negligible, columns, rows_left
+            room.indptr, room.indices, vals, room.scale, max(drop, CANCELLED), counted, negligible, modes, columns,
+            rows_left,
         )  # fmt: skip
         if leaves and keeps:
             for p in range(entries):
@@ -242,7 +270,7 @@ def write_plan(d, room, columns, rows_left, whole, drop, leaves, keeps, negligib
         if rank < n and left.shape[0] > 0:
             # what was left out may be what was missing
             counted[:] = True
-            leaves, negligible = False, NEGLIGIBLE
+            leaves, negligible, modes = False, NEGLIGIBLE, modes[:0]
             continue
         limit = np.full(entries if left.shape[0] > 0 else 0, np.inf)
         for e in range(left.shape[0]):
@@ -252,7 +280,7 @@ def write_plan(d, room, columns, rows_left, whole, drop, leaves, keeps, negligib
             for p in range(entries):
                 if spared[p]:
                     limit[p] *= COUPLING_LIMIT / negligible
-                    if abs(whole[p]) > WHEN_PLANNED * limit[p]:
+                    if abs(whole[p]) > COUPLING_WHEN_PLANNED * limit[p]:
                         counted[p] = True
                         more = True
         if not more:
@@ -266,7 +294,7 @@ def write_plan(d, room, columns, rows_left, whole, drop, leaves, keeps, negligib
     while not fits:
         fits = _put_lists(
             d, room, with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr,
-            indices,
+            indices, apart,
         )  # fmt: skip
         if not (fits or with_tail):
             return NO_ROOM

@@ -287,6 +287,13 @@ def between_modes(at: dict[str, int], indptr: np.ndarray, indices: np.ndarray) -
     return (row >= 0) & (column >= 0) & (row != column)
 
 
+def places_of_modes(at: dict[str, int], modes: Sequence[int]) -> np.ndarray:
+    """Return the places of p_f, v_f and q_f of each mode and its body, flat; ``modes`` are those of each body."""
+    count = at["lambda"] - at["q_f"]
+    bodies = np.repeat(np.arange(len(modes)), modes)
+    return np.column_stack([at[block] + np.arange(count) for block in MODAL] + [bodies]).ravel().astype(np.int64)
+
+
 def scales(
     counts: Counts, formulation: int, bodies: np.ndarray, modes: np.ndarray, length: float, largest_force: float
 ) -> np.ndarray:

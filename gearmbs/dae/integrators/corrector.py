@@ -309,10 +309,8 @@ def rounding_level(st, plan, factors):
     y, matrix, size, moved = st.y, st.matrix, st.res, st.y_between
     n = y.shape[0]
     size[:] = 0.0
-    for k in range(n):
-        a = abs(y[plan.col_to[k]])
-        for p in range(plan.a_ptr[k], plan.a_ptr[k + 1]):
-            size[plan.row_from[plan.a_pos[p]]] += abs(matrix[plan.a_src[p]]) * a
+    for p in range(matrix.shape[0]):
+        size[st.entry_row[p]] += abs(matrix[p]) * abs(y[st.entry_col[p]])
     level = 0.0
     phase = 0.0
     for _ in range(NOISE_SAMPLES):

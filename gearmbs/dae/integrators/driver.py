@@ -138,7 +138,7 @@ class Run:
             self.pivots = Pivots(st.matrix.copy(), drop, negligible, None if counted is None else counted.copy())
             self.plan = analyse(
                 self.indptr, self.indices, st.matrix, self.scale, drop, counted, negligible,
-                with_tail=problem.small_entries, couplings=problem.couplings, lines=self.lines,
+                with_tail=problem.small_entries, couplings=problem.couplings, modes=problem.modes, lines=self.lines,
             )  # fmt: skip
             st.gamma_planned = st.gamma
             st.plan_sign = direct(parity)(self.plan.row_from) * direct(parity)(self.plan.col_to)

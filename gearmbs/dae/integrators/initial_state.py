@@ -134,6 +134,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.t_pause = np.inf
     st.h_max = np.inf if options.max_step is None else options.max_step
     st.rtol = options.rtol
+    st.matrix_dear = problem.small_entries
     st.rate_allowed = RATE_ALLOWED_IF_DEAR if problem.jacobian_residuals >= DEAR else RATE_ALLOWED
     st.max_order = options.highest_order if options.max_order is None else int(options.max_order)
     st.max_iterations = MAX_ITERATIONS if options.max_iterations is None else int(options.max_iterations)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gearmbs.dae.integrators.controller import meets_kinks
 from gearmbs.dae.integrators.run_state import REPIVOT, RUNNING, copy
-from gearmbs.dae.linalg.sparse_lu import fits, refactor
+from gearmbs.dae.linalg.sparse_lu import fits, refactor_carried
 from gearmbs.kernels.jit import njit
 
 GAMMA_DRIFT = 0.2
@@ -14,6 +14,10 @@ table of constants."""
 GAMMA_DRIFT_AT_KINKS = 0.3
 """Larger where steps change so often that factors serve but a few of them."""
 MATRIX_MAX_AGE = 50
+GAMMA_DRIFT_IF_DEAR, GAMMA_DRIFT_AT_KINKS_IF_DEAR, MATRIX_MAX_AGE_IF_DEAR = 0.3, 0.5, 200
+"""The same with bodies that deform, whose matrix takes 17 to 50 residuals to evaluate and two or three to factor. Of a
+pair on shafts with 16 modes each the first 0.1 s take 39 % fewer factorisations and 40 % fewer matrices then, and 10 %
+more residuals; with 100 modes as many."""
 SLOPE_MAX_AGE = 20
 RATE_OF_FRESH = 0.1
 """Rate that is expected of a new matrix until its own is known. Tuned, see the table of constants."""
@@ -102,7 +106,10 @@ def factor_matrix(st, plan, factors):
         if ratio > PLANNED_RANGE or ratio * PLANNED_RANGE < 1.0:
             return False
     st.factorizations += 1
-    return leaves_little_out(st, plan) and refactor(plan, factors, st.matrix) <= st.growth_limit
+    carried = st.matrix_judged
+    if not leaves_little_out(st, plan):
+        return False
+    return refactor_carried(plan, factors, st.matrix, st.jac_slope, carried) <= st.growth_limit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -120,9 +127,13 @@ def form_matrix(functions, st, plan, factors):
         st.h = st.h_wanted
         return REPIVOT
     drift = st.gamma / st.gamma_factored
-    allowed = 1.0 + (GAMMA_DRIFT_AT_KINKS if meets_kinks(st) else GAMMA_DRIFT)
+    if st.matrix_dear:
+        allowed = 1.0 + (GAMMA_DRIFT_AT_KINKS_IF_DEAR if meets_kinks(st) else GAMMA_DRIFT_IF_DEAR)
+    else:
+        allowed = 1.0 + (GAMMA_DRIFT_AT_KINKS if meets_kinks(st) else GAMMA_DRIFT)
     whole_again = st.drop_level > 0 and st.drop_age >= DROPPED_STEPS
-    wanted = st.matrix_wanted or st.matrix_age >= MATRIX_MAX_AGE or whole_again
+    old = st.matrix_age >= (MATRIX_MAX_AGE_IF_DEAR if st.matrix_dear else MATRIX_MAX_AGE)
+    wanted = st.matrix_wanted or old or whole_again
     if not (wanted or drift > allowed or drift < 1.0 / allowed):
         return RUNNING
     if wanted:

@@ -213,6 +213,7 @@ class RunState(Struct):
     t_pencil: float  # where that was seen
     gamma_large: float  # the least of these gamma
     rate: float  # of convergence of the corrector, as last seen
+    matrix_dear: bool  # whether it takes many residuals to evaluate and to factor, as with bodies that deform
     rate_allowed: float  # beyond which the matrix is evaluated anew for the next step
     drop_level: int  # how large pivots may be to be left out near a singular position
     drop_age: int

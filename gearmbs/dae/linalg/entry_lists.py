@@ -164,6 +164,8 @@ COUPLING_LIMIT = 0.3
 those of a shaft, gyroscopic most of them, reach 1e-3."""
 WHEN_PLANNED = 0.01
 """Share of that size from which on an entry counts when a plan is made."""
+COUPLING_WHEN_PLANNED = 0.2
+"""The same of an entry between modes, which are condensed one by one where none of theirs counts."""
 RATE_ALLOWED = 0.02
 """Largest part of an error that one of the first two corrections may leave for lack of these entries: the corrector
 expects no less."""

@@ -8,8 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import boolean, float64, int64, types, uint32
 
+from gearmbs.dae.linalg.condensed import COLUMN_AT, COLUMNS, GROUP, ROW_AT, ROWS
+from gearmbs.dae.linalg.condensed_lists import condensed_matrix, modes_apart, modes_first
 from gearmbs.dae.linalg.entry_lists import (
     COUPLING_LIMIT,
+    COUPLING_WHEN_PLANNED,
     NEGLIGIBLE,
     NEGLIGIBLE_IN_NEWTON,
     WHEN_PLANNED,
@@ -81,6 +84,21 @@ class LUPlan(Struct):
         Scales, in pivot order.
     kept : ndarray
         One for a proper pivot; zero for an equation and an unknown set aside because the matrix is nearly singular.
+    groups : ndarray
+        For each body whose modes are condensed ahead of all this what `gearmbs.dae.linalg.condensed` knows of it; empty
+        if none are. All lists are then those of the matrix that is left, with ones on the diagonal for the modes, whose
+        pivots come first, and ``a_src`` and ``tail_src`` are places among its scaled values.
+    mode_at : ndarray
+        Places of p, v and q of each mode in the whole matrix.
+    row_at, column_at : ndarray
+        For each body the equations that its modes enter, by their places among the pivots, and the unknowns that enter
+        its modes' equations, by their places in the whole matrix.
+    fill_at, fill_src : ndarray
+        Where the entries in equations or by unknowns of modes stand among the numbers of the bodies, and these entries.
+    rest_src, rest_scale : ndarray
+        All other entries, in the order of the values that are left, and their scales.
+    schur_at, schur_scale : ndarray
+        Where the products that are taken off stand among the values that are left, and their scales.
     left_src, left_limit : ndarray
         Entries left out, by their index in the CSC values, and the largest absolute values with which they may be.
     limit : ndarray
@@ -139,6 +157,16 @@ class LUPlan(Struct):
     row_scale: Vector
     col_scale: Vector
     kept: Vector
+    groups: IntVector
+    mode_at: IndexVector
+    row_at: IndexVector
+    column_at: IndexVector
+    fill_at: IndexVector
+    fill_src: IndexVector
+    rest_src: IndexVector
+    rest_scale: Vector
+    schur_at: IndexVector
+    schur_scale: Vector
     left_src: IndexVector
     left_limit: Vector
     limit: Vector
@@ -147,13 +175,16 @@ class LUPlan(Struct):
 PLAN_TYPE = LUPlan.numba_type
 
 
+NO_MODES = np.zeros(0, dtype=np.int64)
+
+
 class _Pivots:
     """Pivots, and the entries that they are chosen for: all that a plan follows from but its scales.
 
     Parameters
     ----------
     with_tail, rank, lists
-        As of `plan_from_pivots`; the lists from ``rows`` to ``u_cols``, then from ``taken`` to ``left``.
+        As of `plan_from_pivots`; the lists from ``rows`` to ``u_cols``, from ``taken`` to ``apart``, then ``left``.
     """
 
     def __init__(self, with_tail: bool, rank: int, *lists: np.ndarray) -> None:
@@ -184,25 +215,40 @@ def _rows_and_columns(
     return indices[k], np.searchsorted(indptr, k, side="right") - 1
 
 
+def _rows_and_columns_of_blocks(f: dict[str, np.ndarray], rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the equations and unknowns of the blocks that a condensation takes off, column by column."""
+    found: list[tuple[np.ndarray, np.ndarray]] = []
+    for one in f["groups"].reshape(-1, GROUP):
+        i = rows[f["row_at"][one[ROW_AT] : one[ROW_AT] + one[ROWS]]]
+        j = f["column_at"][one[COLUMN_AT] : one[COLUMN_AT] + one[COLUMNS]]
+        found.append((np.tile(i, len(j)), np.repeat(j, len(i))))
+    i, j = (np.concatenate(part) for part in zip(*found, strict=True))
+    return i, j
+
+
 @lru_cache(maxsize=KNOWN)
 def _unscaled_plan(pivots: _Pivots) -> _Unscaled:
     """Return the plan that follows from pivots, the same object for the same ones."""
     with_tail, rank = pivots.with_tail, pivots.rank
-    rows, cols, l_ptr, l_rows, u_ptr, u_cols, taken, indptr, indices, left = pivots.lists
+    rows, cols, l_ptr, l_rows, u_ptr, u_cols, taken, indptr, indices, apart, left = pivots.lists
     ones, none = np.ones(len(rows)), np.empty(0)
     tail, u_tail, *lists = direct(lists_of_plan)(
-        with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices
+        with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, ones, ones, taken, indptr, indices, apart
     )
     f = dict(zip(LISTS, lists, strict=True))
-    of_a = _rows_and_columns(f["a_src"], taken, indptr, indices)
-    of_tail = _rows_and_columns(f["tail_src"], taken, indptr, indices)
+    if len(apart):
+        of_a = _rows_and_columns(f["rest_src"], taken, indptr, indices)
+        of_tail = _rows_and_columns_of_blocks(f, rows)
+    else:
+        of_a = _rows_and_columns(f["a_src"], taken, indptr, indices)
+        of_tail = _rows_and_columns(f["tail_src"], taken, indptr, indices)
     plan = LUPlan(left_src=left, left_limit=none, limit=none, tail=tail, u_tail=u_tail, **f)
     return _Unscaled(plan, of_a, of_tail, (rows, cols))
 
 
 def plan_from_pivots(
-    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left,
-    left_limit,
+    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, apart,
+    left, left_limit,
 ) -> LUPlan:  # fmt: skip
     """Return the plan that follows from pivots.
 
@@ -218,17 +264,20 @@ def plan_from_pivots(
         Scales of equations and unknowns.
     taken, indptr, indices : ndarray
         Entries of the matrix that the plan is made for, and their pattern.
+    apart : ndarray of int64
+        As of `lists_of_plan`.
     left, left_limit : ndarray
         Entries left out, and the largest absolute values with which they may be.
     """
     known = _unscaled_plan(
-        _Pivots(with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, taken, indptr, indices, left)
+        _Pivots(with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, taken, indptr, indices, apart, left)
     )
     (i, j), (p, q) = known.entries, known.pivots
-    scaled = {"a_scale": row_scale[i] * col_scale[j], "row_scale": row_scale[p], "col_scale": col_scale[q]}
-    if known.plan.tail < len(rows):
+    of_entries, of_others = ("rest_scale", "schur_scale") if len(apart) else ("a_scale", "tail_scale")
+    scaled = {of_entries: row_scale[i] * col_scale[j], "row_scale": row_scale[p], "col_scale": col_scale[q]}
+    if len(apart) or known.plan.tail < len(rows):
         i, j = known.of_tail
-        scaled["tail_scale"] = row_scale[i] * col_scale[j]
+        scaled[of_others] = row_scale[i] * col_scale[j]
     if len(left):
         limit = np.full(len(taken) + len(left), np.inf)
         limit[left] = left_limit
@@ -264,19 +313,19 @@ class SingularMatrixError(ValueError):
 
 
 @njit(
-    types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC, _UVEC, _VEC))(
-        _IVEC, _IVEC, _VEC, _VEC, float64, _MASK, float64, LINES_TYPE, LINES_TYPE
+    types.Tuple((int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC, _IVEC, _UVEC, _VEC))(
+        _IVEC, _IVEC, _VEC, _VEC, float64, _MASK, float64, _IVEC, LINES_TYPE, LINES_TYPE
     ),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
-def scale_and_choose(all_ptr, all_indices, vals, scale, drop, counted, negligible, columns, rows_left):
+def scale_and_choose(all_ptr, all_indices, vals, scale, drop, counted, negligible, modes, columns, rows_left):
     """Scale the matrix, leave out what is negligible and choose pivots.
 
     Parameters
     ----------
-    all_ptr, all_indices, vals, scale, drop, counted, negligible
+    all_ptr, all_indices, vals, scale, drop, counted, negligible, modes
         As the pattern and the others of `analyse`.
     columns, rows_left
         As in `choose_pivots`.
@@ -289,21 +338,26 @@ def scale_and_choose(all_ptr, all_indices, vals, scale, drop, counted, negligibl
         Scales; entries of the matrix that the plan is made for.
     indptr, indices
         Their pattern.
+    apart
+        Modes that are condensed.
     left, left_limit
         See `LUPlan`.
     """
     row_scale, col_scale, all_scaled = scaled_entries(all_ptr, all_indices, vals, scale)
     taken, left = part_entries(all_scaled, counted, WHEN_PLANNED * negligible)
     indptr, indices, scaled = taken_pattern(all_ptr, all_indices, all_scaled, taken)
-    growth = np.inf
+    growth, apart = np.inf, modes_apart(indptr, indices, scaled, modes)
+    part_ptr, part, scaled = condensed_matrix(indptr, indices, scaled, apart)
     for threshold in THRESHOLDS:
         if growth > GROWTH_ALLOWED:
             rank, growth, rows, cols, l_ptr, l_rows, u_ptr, u_cols = choose_pivots(
-                indptr, indices, scaled, drop, threshold, columns, rows_left
+                part_ptr, part, scaled, drop, threshold, columns, rows_left
             )
+    rows, cols, l_ptr, u_ptr = modes_first(row_scale.shape[0], apart, rows, cols, l_ptr, u_ptr)
     left_limit = limits(all_ptr, all_indices, left, row_scale, col_scale, negligible)
     return (
-        rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, left, left_limit
+        rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, apart, left,
+        left_limit,
     )  # fmt: skip
 
 
@@ -335,6 +389,7 @@ def analyse(
     negligible: float = NEGLIGIBLE,
     with_tail: bool = False,
     couplings: np.ndarray | None = None,
+    modes: np.ndarray | None = None,
     lines: tuple[Lines, Lines] | None = None,
 ) -> LUPlan:
     """Choose pivots for a matrix and lay down the plan to factor every matrix of its pattern.
@@ -360,6 +415,9 @@ def analyse(
     couplings : ndarray of bool, optional
         Entries that are left out up to `COUPLING_LIMIT`, unless they have counted before, if ``negligible`` is the
         first of `NEGLIGIBLE_IN_NEWTON`.
+    modes : ndarray of int64, optional
+        Places of p, v and q, and the body, of each mode; those that stand apart are condensed, see
+        `gearmbs.dae.linalg.condensed`.
     lines : pair of Lines, optional
         Scratch of `lines_for` the pattern, for who analyses many matrices of it; default new ones.
 
@@ -380,10 +438,13 @@ def analyse(
     n = len(indptr) - 1
     columns, rows = lines_for(indptr, indices) if lines is None else lines
     counted = np.ones(len(indices), dtype=bool) if counted is None else counted
+    modes = NO_MODES if modes is None or drop > 0.0 else modes
     spared = None if couplings is None or negligible < NEGLIGIBLE_IN_NEWTON[0] else couplings & ~counted
     whole, vals = vals, vals if spared is None else np.where(spared, 0.0, vals)
     while True:
-        rank, *chosen = choose(indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, columns, rows)
+        rank, *chosen = choose(
+            indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, modes, columns, rows
+        )
         if rank >= 0:
             break
         columns, rows = new_lines(n, 2 * len(columns.pool))
@@ -397,11 +458,11 @@ def analyse(
     if spared is None or not len(plan.limit):
         return plan
     plan.limit[spared] *= COUPLING_LIMIT / negligible
-    large = spared & (np.abs(whole) > WHEN_PLANNED * plan.limit)
+    large = spared & (np.abs(whole) > COUPLING_WHEN_PLANNED * plan.limit)
     if not large.any():
         return plan
     counted |= large
-    return analyse(indptr, indices, whole, scale, drop, counted, negligible, with_tail, couplings)
+    return analyse(indptr, indices, whole, scale, drop, counted, negligible, with_tail, couplings, modes)
 
 
 @njit(float64(_UVEC), cache=True, nogil=True, error_model="numpy")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import boolean, float64, int64, types, uint32
 
-from gearmbs.dae.linalg.entry_lists import entry_lists
+from gearmbs.dae.linalg.condensed import COLUMN_AT, COLUMNS, GROUP, ROW_AT, ROWS, SCHUR_AT
+from gearmbs.dae.linalg.condensed_lists import filled, groups_of, reduced_pattern
+from gearmbs.dae.linalg.entry_lists import entry_lists, places_of
 from gearmbs.dae.linalg.front_blocks import (
     blocks_above,
     entries_in_blocks,
@@ -26,7 +28,8 @@ LISTS = (
     "u_col", "l_col", "block_col", "lane_ptr", "act_ptr", "act_to", "act_by", "act_u", "last_ptr", "last_to",
     "part_ptr", "part_at", "part_col", "above_ptr", "above_col", "above_at", "l_to", "l_by", "u_to", "u_by", "a_to",
     "pivot_ptr", "pivot_order", "op_ptr", "op_to", "op_l", "op_u", "div_ptr", "div_to", "div_by", "node_end",
-    "row_from", "col_to", "row_scale", "col_scale", "kept",
+    "row_from", "col_to", "row_scale", "col_scale", "kept", "groups", "mode_at", "row_at", "column_at", "fill_at",
+    "fill_src", "rest_src", "rest_scale", "schur_at", "schur_scale",
 )  # fmt: skip
 """Fields of a `gearmbs.dae.linalg.lu_plan.LUPlan` in the order in which `lists_of_plan` returns them."""
 
@@ -34,21 +37,56 @@ _VEC = float64[::1]
 _IVEC = int64[::1]
 _UVEC = uint32[::1]
 _OF_POINTERS = {"u_ptr", "a_ptr", "l_ptr", "lane_ptr", "act_ptr", "last_ptr", "part_ptr", "above_ptr", "pivot_ptr",
-                "op_ptr", "div_ptr", "node_end"}  # fmt: skip
-_OF_NUMBERS = {"a_scale", "tail_scale", "row_scale", "col_scale", "kept"}
+                "op_ptr", "div_ptr", "node_end", "groups"}  # fmt: skip
+_OF_NUMBERS = {"a_scale", "tail_scale", "row_scale", "col_scale", "kept", "rest_scale", "schur_scale"}
 _TYPES = [_VEC if name in _OF_NUMBERS else _IVEC if name in _OF_POINTERS else _UVEC for name in LISTS]
 
 
 @njit(
+    types.Tuple((_VEC, _VEC))(_IVEC, _IVEC, _UVEC, _VEC, _VEC, _IVEC, _UVEC, _UVEC, int64),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def scales_of_rest(indptr, indices, slots, row_scale, col_scale, groups, rows, columns, rest):
+    """Return the scales of the entries that a condensation leaves, and of those of its blocks.
+
+    Parameters
+    ----------
+    indptr, indices, slots, groups, rows, columns
+        Of `gearmbs.dae.linalg.condensed_lists.reduced_pattern`.
+    row_scale, col_scale : ndarray, shape (n,)
+    rest : int
+        Entries of the whole matrix that are left.
+    """
+    rest_scale, size = np.empty(rest), 0
+    for j in range(indptr.shape[0] - 1):
+        for p in range(indptr[j], indptr[j + 1]):
+            if slots[p] < rest:
+                rest_scale[slots[p]] = row_scale[indices[p]] * col_scale[j]
+    for group in range(groups.shape[0] // GROUP):
+        size += groups[GROUP * group + ROWS] * groups[GROUP * group + COLUMNS]
+    schur_scale = np.empty(size)
+    for group in range(groups.shape[0] // GROUP):
+        one = groups[GROUP * group : GROUP * (group + 1)]
+        e = one[SCHUR_AT]
+        for j in range(one[COLUMNS]):
+            for i in range(one[ROWS]):
+                schur_scale[e] = row_scale[rows[one[ROW_AT] + i]] * col_scale[columns[one[COLUMN_AT] + j]]
+                e += 1
+    return rest_scale, schur_scale
+
+
+@njit(
     types.Tuple((int64, int64, *_TYPES))(
-        boolean, int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC
+        boolean, int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC, _IVEC
     ),
     cache=True,
     nogil=True,
     error_model="numpy",
 )
 def lists_of_plan(
-    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices
+    with_tail, rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices, apart
 ):
     """Return all fields of a plan that follow from its pivots.
 
@@ -60,6 +98,8 @@ def lists_of_plan(
         Of `gearmbs.dae.linalg.pivoting.choose_pivots`.
     row_scale, col_scale, taken, indptr, indices
         Scales, and the entries that the plan is made for.
+    apart : ndarray of int64
+        Modes that are condensed, of `gearmbs.dae.linalg.condensed_lists.modes_apart`.
 
     Returns
     -------
@@ -76,6 +116,24 @@ def lists_of_plan(
     act_ptr, act_to, act_by, act_u, last_ptr, last_to = no_bounds, no_places, no_places, no_places, no_bounds, no_places
     part_ptr, part_at, part_col = no_bounds, no_places, no_places
     above_ptr, above_col, above_at = no_bounds, no_places, no_places
+    groups, mode_at, row_at, column_at, fill_at, fill_src = (
+        no_bounds,
+        no_places,
+        no_places,
+        no_places,
+        no_places,
+        no_places,
+    )
+    rest_src, rest_scale, schur_at, schur_scale = no_places, no_numbers, no_places, no_numbers
+    if apart.shape[0] > 0:
+        groups, mode_at, row_at, column_at = groups_of(indptr, indices, apart)
+        fill_at, fill_src = filled(indptr, indices, apart, groups, row_at, column_at)
+        indptr, indices, slots, rest_src, schur_at = reduced_pattern(indptr, indices, apart, groups, row_at, column_at)
+        rest_scale, schur_scale = scales_of_rest(
+            indptr, indices, slots, row_scale, col_scale, groups, row_at, column_at, rest_src.shape[0]
+        )
+        fill_src, rest_src, taken = taken[fill_src], taken[rest_src], slots
+        row_at = places_of(rows)[row_at].astype(np.uint32)
     tail = tail_of_plan(rank, l_ptr, u_ptr) if with_tail else n
     if tail < n:
         l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
@@ -85,6 +143,9 @@ def lists_of_plan(
     ) = entry_lists(
         rank, rows, cols, l_ptr, l_rows, u_ptr, u_cols, row_scale, col_scale, taken, indptr, indices
     )  # fmt: skip
+    if apart.shape[0] > 0:
+        # their values are scaled
+        a_scale[:] = 1.0
     if tail < n:
         l_ptr, l_pos, l_col, block_col, lane_ptr, block_ptr, block_at, block_lane = front_blocks(tail, l_ptr, l_pos)
         a_ptr, a_pos, a_src, a_scale, tail_at, tail_src, tail_scale = entries_in_blocks(
@@ -124,5 +185,6 @@ def lists_of_plan(
         tail, u_tail, a_ptr, a_pos, a_src, a_scale, tail_at, tail_src, tail_scale, u_by_col, u_pos, l_ptr, l_pos, u_col,
         l_col, block_col, lane_ptr, act_ptr, act_to, act_by, act_u, last_ptr, last_to, part_ptr, part_at, part_col,
         above_ptr, above_col, above_at, l_to, l_by, u_to, u_by, a_to, pivot_ptr, pivot_order, op_ptr, op_to, op_l, op_u,
-        div_ptr, div_to, div_by, node_end, row_from, col_to, by_row, by_col, kept,
+        div_ptr, div_to, div_by, node_end, row_from, col_to, by_row, by_col, kept, groups, mode_at, row_at, column_at,
+        fill_at, fill_src, rest_src, rest_scale, schur_at, schur_scale,
     )  # fmt: skip

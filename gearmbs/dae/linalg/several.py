@@ -14,8 +14,8 @@ from gearmbs.kernels.pointers import direct
 
 
 def has_lanes(plan: LUPlan) -> bool:
-    """Return whether a plan can be gone through for several sides at once: it has no nodes and no dense tail."""
-    return not direct(has_nodes)(plan.node_end) and plan.tail == plan.row_from.shape[0]
+    """Return whether a plan can be gone through for several sides at once: without nodes, a dense tail and modes."""
+    return not (direct(has_nodes)(plan.node_end) or len(plan.groups)) and plan.tail == plan.row_from.shape[0]
 
 
 @njit(

@@ -13,6 +13,16 @@ from functools import lru_cache
 import numpy as np
 from numba import float64, int64, types
 
+from gearmbs.dae.linalg.condensed import (
+    condense,
+    fill,
+    fill_moving,
+    modes_after,
+    note_moving,
+    put_pivots,
+    without_modes,
+)
+from gearmbs.dae.linalg.condensed_lists import numbers_of
 from gearmbs.dae.linalg.dense_tail import (
     act_on_blocks,
     divide_blocks,
@@ -29,6 +39,7 @@ from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.schedule import has_nodes, through_node
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.lanes import LANES, all_lanes, bits_of, double_of
+from gearmbs.kernels.pointers import direct
 from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, Struct, Vector, vector_at
 
 # Factors and substitutions column by column (left-looking), where columns are taken together as nodes.
@@ -183,6 +194,11 @@ class LUFactors(Struct):
         U of the pivots before the dense tail in its columns, block by block.
     lower, rest : ndarray
         L of the dense tail, and its part of a right-hand side.
+    every, left, reduced : ndarray
+        Numbers of the bodies whose modes are condensed, the scaled entries that are left, and these less what the modes
+        take off; see `gearmbs.dae.linalg.condensed`.
+    moving : ndarray
+        Of `gearmbs.dae.linalg.condensed.note_moving`, its first number -1 where nothing is noted.
     """
 
     lu: Vector
@@ -193,13 +209,19 @@ class LUFactors(Struct):
     above: Vector
     lower: Vector
     rest: Vector
+    every: Vector
+    left: Vector
+    reduced: Vector
+    moving: Vector
 
 
 FACTORS_TYPE = LUFactors.numba_type
 
 
 @lru_cache(maxsize=KEPT_LAYOUTS)
-def _layout(n: int, tail: int, entries: int, blocks: int, above: int) -> BlockLayout[LUFactors]:
+def _layout(
+    n: int, tail: int, entries: int, blocks: int, above: int, every: int, left: int, reduced: int, moving: int
+) -> BlockLayout[LUFactors]:
     """Return where the numbers stand: arrays, and of ``x`` the rows of the tail, where the processor reads lanes."""
     rows = padded(n - tail)
     sizes = {
@@ -211,6 +233,10 @@ def _layout(n: int, tail: int, entries: int, blocks: int, above: int) -> BlockLa
         "above": LANES * above,
         "lower": rows * (n - tail) + LANES,
         "rest": rows,
+        "every": every,
+        "left": left,
+        "reduced": reduced,
+        "moving": moving,
     }
     return BlockLayout(LUFactors, sizes, on_line={"x": tail})
 
@@ -218,7 +244,27 @@ def _layout(n: int, tail: int, entries: int, blocks: int, above: int) -> BlockLa
 def new_factors(plan: LUPlan) -> LUFactors:
     """Return empty factors for a plan."""
     entries = len(plan.l_pos) + len(plan.u_pos)
-    return _layout(len(plan.row_from), plan.tail, entries, len(plan.block_col), len(plan.above_col)).new()
+    every, reduced = direct(numbers_of)(plan.groups), direct(values_left)(plan)
+    blocks, left = (len(plan.block_col), len(plan.above_col)), len(plan.rest_src)
+    moving = len(plan.fill_src) + left + 2 if reduced else 0
+    factors = _layout(len(plan.row_from), plan.tail, entries, *blocks, every, left, reduced, moving).new()
+    if reduced:
+        factors.reduced[-1] = 1.0
+        factors.moving[0] = -1.0
+    return factors
+
+
+@njit(int64(PLAN_TYPE), cache=True, nogil=True, error_model="numpy")
+def values_left(plan):
+    """Return how many values a condensation leaves, the one on the diagonal of the modes included; 0 without one."""
+    if plan.groups.shape[0] == 0:
+        return 0
+    largest = np.uint32(0)
+    for e in range(plan.a_src.shape[0]):
+        largest = max(largest, plan.a_src[e])
+    for e in range(plan.tail_src.shape[0]):
+        largest = max(largest, plan.tail_src[e])
+    return np.int64(largest) + 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -295,6 +341,52 @@ def fits(plan, vals):
 @njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC), cache=True, nogil=True, error_model="numpy")
 def refactor(plan, factors, vals):
     """Factor as `factor` does, without a look at the entries that the plan leaves out."""
+    if plan.groups.shape[0] == 0:
+        return factor_rest(plan, factors, vals)
+    fill(plan.fill_at, plan.fill_src, plan.rest_src, plan.rest_scale, vals, factors.every, factors.left)
+    factors.moving[0] = -1.0
+    return factor_condensed(plan, factors)
+
+
+@njit(float64(PLAN_TYPE, FACTORS_TYPE, _VEC, _VEC, types.boolean), cache=True, nogil=True, error_model="numpy")
+def refactor_carried(plan, factors, vals, slope, carried):
+    """Factor as `refactor` does a matrix that is carried over along its slope.
+
+    Parameters
+    ----------
+    plan, factors, vals
+        As of `factor`.
+    slope : ndarray
+        Changes of the values with what the matrix is carried over to.
+    carried : bool
+        Whether only entries with a slope are others than in the last matrix.
+    """
+    if plan.groups.shape[0] == 0:
+        return factor_rest(plan, factors, vals)
+    if carried and factors.moving[0] >= 0.0:
+        fill_moving(
+            plan.fill_at, plan.fill_src, plan.rest_src, plan.rest_scale, vals, factors.every, factors.left,
+            factors.moving,
+        )  # fmt: skip
+    else:
+        fill(plan.fill_at, plan.fill_src, plan.rest_src, plan.rest_scale, vals, factors.every, factors.left)
+        note_moving(plan.fill_src, plan.rest_src, slope, factors.moving)
+    return factor_condensed(plan, factors)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def factor_condensed(plan, factors):
+    """Condense the modes whose numbers are filled, and factor what is left; return what `factor` does."""
+    reduced = factors.reduced
+    cancelled = condense(plan.groups, plan.schur_at, plan.schur_scale, factors.every, factors.left, reduced)
+    growth = factor_rest(plan, factors, reduced)
+    put_pivots(plan.groups, factors.every, factors.pivot_inv)
+    return cancelled if not cancelled <= growth else growth
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def factor_rest(plan, factors, vals):
+    """Factor what a condensation leaves, or the whole matrix where nothing is condensed; return what `factor` does."""
     if has_nodes(plan.node_end):
         return factor_by_columns(plan, factors, vals)
     return _factor_by_levels(plan, factors, vals)
@@ -325,8 +417,11 @@ def solve(plan, factors, b, out):
     l_to, l_by, u_to, u_by = plan.l_to, plan.l_by, plan.u_to, plan.u_by
     row_from, row_scale, col_to, col_scale = plan.row_from, plan.row_scale, plan.col_to, plan.col_scale
     n = pivot_inv.shape[0]
-    for k in range(n):
+    ahead = plan.mode_at.shape[0]
+    for k in range(ahead, n):
         x[k] = b[row_from[k]] * row_scale[k]
+    if ahead > 0:
+        without_modes(plan.groups, plan.mode_at, plan.row_at, row_scale, b, factors.every, x)
     by_nodes = has_nodes(plan.node_end)
     if by_nodes:
         forward_by_nodes(plan, factors)
@@ -347,12 +442,16 @@ def solve(plan, factors, b, out):
         for p in range(first, np.uint64(u_to.shape[0])):
             k = u_by[p]
             x[u_to[p]] -= lu[upper + p] * (x[k] * pivot_inv[k])
-    for k in range(known):
+    for k in range(ahead):
+        x[k] = 0.0
+    for k in range(np.uint64(ahead), known):
         out[col_to[k]] = x[k] * pivot_inv[k] * col_scale[k]
         x[k] = 0.0
     for k in range(known, np.uint64(n)):
         out[col_to[k]] = x[k] * col_scale[k]
         x[k] = 0.0
+    if ahead > 0:
+        modes_after(plan.groups, plan.mode_at, plan.column_at, factors.every, out)
 
 
 @njit(types.void(PLAN_TYPE, FACTORS_TYPE, _MAT), cache=True, nogil=True, error_model="numpy")

@@ -214,6 +214,7 @@ def make_problem(system: BaseSystem, formulation: str, rate_scale: float) -> DAE
         jacobian_residuals=round(RESIDUALS_AN_ENTRY * len(indices) / at["n"]) if flexible else 0,
         small_entries=flexible,
         couplings=unknowns.between_modes(at, indptr, indices) if flexible else None,
+        modes=unknowns.places_of_modes(at, model.modes) if flexible else None,
         finite_rates=model.has_finite_forces,
         solved_at_outputs=unknowns.plain_states(at, model.controlled_states),
         solved_if_needed=unknowns.loads(at),

@@ -295,7 +295,7 @@ def test_couplings_are_left_out_with_the_first_limit_until_they_are_large(neglig
     n, rng = 30, np.random.default_rng(5)
     a = np.diag(rng.uniform(1.0, 1.5, n)) + np.diag(rng.uniform(0.3, 0.5, n - 1), 1)
     couplings = np.zeros((n, n), dtype=bool)
-    for k, size in enumerate((1e-3, 5e-4, 1e-3, 2e-3, 0.05)):
+    for k, size in enumerate((1e-3, 5e-4, 1e-3, 2e-3, 0.15)):
         a[20 + k, k], couplings[20 + k, k] = size, True
     # others of the same size count
     a[5, 25] = 1e-3

@@ -383,7 +383,7 @@ def _analysed(run: Remembers, pivots: Pivots) -> LUPlan:
     counted = None if pivots.counted is None else pivots.counted.copy()
     return analyse(
         run.indptr, run.indices, pivots.matrix, run.scale, pivots.drop, counted, pivots.negligible,
-        with_tail=run.problem.small_entries, couplings=run.problem.couplings,
+        with_tail=run.problem.small_entries, couplings=run.problem.couplings, modes=run.problem.modes,
     )  # fmt: skip
 
 
