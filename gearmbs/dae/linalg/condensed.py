@@ -338,8 +338,8 @@ def without_modes(groups, mode_at, row_at, row_scale, side, every, x):
             put_lanes(numbers, gathered // LANES + b, even + odd)
         first = one[ROW_AT]
         for i in range(rows):
-            k = np.int64(row_at[first + i])
-            x[k] -= numbers[gathered + i] * row_scale[k]
+            place = np.int64(row_at[first + i])
+            x[place] -= numbers[gathered + i] * row_scale[place]
 
 
 @njit(
