@@ -206,7 +206,7 @@ def touch(ints, reals, want, work, path, h, load):
     return delta, energy
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def shared_centre(ints, reals, want, work, path, x, y, u_r, phi, h, load, law):
     """Write a path's contact of a ball with centrifugal load; return its deflection and, with the first path, energy.
 
@@ -245,7 +245,7 @@ def shared_centre(ints, reals, want, work, path, x, y, u_r, phi, h, load, law):
     return delta, energy
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def missing(ints, reals, profiles, states, want, work, j, path, out):
     """Return the missing material at an element's path; write the slopes and curvatures of the three profiles.
 

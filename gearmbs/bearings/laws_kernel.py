@@ -157,7 +157,7 @@ ITERATIONS = 60
 HALVINGS = 30
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def positive_part(delta, width):
     """Return max(delta, 0) and its slope, smooth to the second derivative between -width and width."""
     if delta >= width:
@@ -179,7 +179,7 @@ def hertz_force(stiffness, exponent, delta):
     return root * delta, exponent * root
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def hertz_energy(stiffness, exponent, delta, width, transition):
     """Return the work stored at a deflection: the integral of K s(delta)^n.
 
@@ -385,7 +385,7 @@ def ball_law_at_speed(reals, x, y, other_x, other_y, apart, twist, h, vr, vz, la
     return inner
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def roller_law_at_speed(reals, share, nx, ny, delta, load, law):
     """Write the contact of a slice of a roller pressed outward; return its deflection and energy.
 

@@ -116,6 +116,7 @@ class PartLibrary(_Linked):
             signature=compiled.signature,
             environments=list(environments.values()),
             reload_init=list(library._reload_init),
+            origins=tuple(sorted(compiled.metadata["origins"].returned)),
         )
 
     @staticmethod
@@ -126,12 +127,12 @@ class PartLibrary(_Linked):
             return None
         code = library._final_module.as_bitcode()
         environments = [_kept(e) for e in part.environments]
-        return code, part.fndesc, part.signature, environments, part.reload_init, tuple(library.parts)
+        return code, part.fndesc, part.signature, environments, part.reload_init, tuple(library.parts), part.origins
 
     @staticmethod
     def rebuild(target: Any, package: str, file: str, payload: tuple) -> SimpleNamespace | None:
         """Return a part from what was kept of it; None if a part below it is gone."""
-        code, fndesc, signature, environments, reload_init, parts = payload
+        code, fndesc, signature, environments, reload_init, parts, origins = payload
         for function in reload_init:
             function()
         target.refresh()
@@ -152,6 +153,7 @@ class PartLibrary(_Linked):
             signature=signature,
             environments=[_environment(*e) for e in environments],
             reload_init=reload_init,
+            origins=origins,
         )
 
 

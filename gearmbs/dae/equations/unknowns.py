@@ -391,7 +391,7 @@ def put(mode, slot, vals, k, row, col, value):
     return k + 1
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def put_pair(mode, slot, vals, k, row, col, value):
     """Hand over an entry of Phi_q and its mirror image in Phi_q^T; return the number of the next entry."""
     k = put(mode, slot, vals, k, row, col, value)

@@ -246,7 +246,7 @@ def divide_blocks(plan, blocks, pivot_inv, step, growth):
     return grown, spoiled
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def less_blocks(kept, q, last, blocks, by, numbers, of):
     """Return lanes less the products of blocks and numbers, in two sums, or each would wait for the one before.
 

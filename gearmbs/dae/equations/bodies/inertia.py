@@ -317,7 +317,7 @@ def update_inertia(y, at, modal, partial, body_row):
     add_inertia_change(q_f, first, state, head, sums, body_row)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def add_inertia_change(q_f, first, state, j0, sums, body_row):
     """Complete dJ/dq and H, and write J(q) = J0 + 1/2 sum_k q_k (J1_k + dJ/dq_k) to a body's row.
 

@@ -67,7 +67,7 @@ def _alike(taken: np.ndarray) -> np.ndarray:
     return np.array(order)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath={"contract"})
 def listed_sum(modes, blocks, e, count, values):
     """Return the sum of ``count`` lanes from the e-th one on times the values of their modes; four advance together."""
     one, two, three, four = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)

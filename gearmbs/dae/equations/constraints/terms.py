@@ -151,7 +151,7 @@ def gradient(k, term, fval, reference, marker_body, kin, frame, scratch, g, gt):
     return D.distance_slopes(frame[i], frame[j], scratch, g), 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     """Return d2(phi)/dt2 without the terms in accelerations; ``s`` is scratch."""
     kind = term[k, T.TERM_TYPE]
@@ -173,7 +173,7 @@ def quadratic_part(k, term, fval, marker_body, kin, frame, s):
     return D.distance_bent(frame[i], frame[j], s, kin[bi], kin[bj])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def hessian(k, term, fval, marker_body, kin, frame, hess, s):
     """Write the Hessian of term k over [R_I, theta_I, R_J, theta_J] to ``hess``.
 

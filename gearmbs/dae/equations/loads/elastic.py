@@ -35,7 +35,7 @@ from gearmbs.kernels.pointers import F8, I8, IMAT, IVEC, MAT, VEC
 from gearmbs.kernels.structs import uncounted, uncounted_rows, vector_at
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def wrench_at(f, point, force, torque, sign, marker_body, kin, frame, s):
     """Write arm, force and moment about the origin of frame f to ``s[0:9]``.
 

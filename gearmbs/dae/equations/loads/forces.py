@@ -264,7 +264,7 @@ def evaluate_lean(row, lean, at, rdata, tab, want):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def shift_to_body(m, marker_body, kin, frame, jac, first):
     """Turn columns of marker m's variations ``jac[:, first:first+12]`` into those of its body's frame.
 

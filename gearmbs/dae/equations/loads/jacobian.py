@@ -20,7 +20,7 @@ from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def chain_entries(mode, base, d, sign, bodies, first, unknowns, after, tab, slot, vals, k):
     """Entries of one row from the spatial gradient ``d`` over a list of bodies, then of unknowns.
 
