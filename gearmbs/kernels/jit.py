@@ -202,7 +202,7 @@ class _Origins:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class Lowering(NativeLowering):
-    """Numba's lowering, but that arguments are not counted, nor anything where all arrays are views of others'."""
+    """Numba's lowering, but that no argument is counted, nor anything where all arrays are views of others'."""
 
     _name = "gearmbs_lowering"
 
@@ -213,12 +213,29 @@ class Lowering(NativeLowering):
 
     def run_pass(self, state: Any) -> bool:
         """Write the code of a function."""
-        state.metadata["origins"] = _Origins(state)
-        return NativeLowering.run_pass(self, state)
+        origins = state.metadata["origins"] = _Origins(state)
+        try:
+            return NativeLowering.run_pass(self, state)
+        except errors.NumbaError:
+            if origins.makes:
+                raise
+            # what numba puts in the place of a call may make an array that has no name
+            origins.makes = True
+            return NativeLowering.run_pass(self, state)
 
 
 class _Lower(lowering.Lower):
     """Writes LLVM code of a function."""
+
+    context: Any
+
+    def lower(self) -> None:
+        """Write the function; its wrappers, which are written later, are numba's own."""
+        origins, whole = self.metadata["origins"], self.context
+        if not origins.makes and _HANDED not in origins.returned:
+            self.context = whole.subtarget(enable_nrt=False)
+        super().lower()
+        self.context = whole
 
     def extract_function_arguments(self) -> Any:
         """Return the arguments; as views unless they may be returned."""
@@ -238,20 +255,6 @@ class _Lower(lowering.Lower):
                 inner = self._seen(part, self.builder.extract_value(value, k))
                 value = self.builder.insert_value(value, inner, k)
         return value
-
-    def _counts(self) -> bool:
-        origins = self.metadata["origins"]
-        return origins.makes or _HANDED in origins.returned
-
-    def incref(self, typ: Any, val: Any) -> None:
-        """Count a name of an array."""
-        if self._counts():
-            super().incref(typ, val)
-
-    def decref(self, typ: Any, val: Any) -> None:
-        """Count a name less."""
-        if self._counts():
-            super().decref(typ, val)
 
 
 def njit(
