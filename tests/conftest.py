@@ -18,8 +18,8 @@ if os.environ.get("GEARMBS_COMPILER") == "plain":
     # what is asked of the own stages, and the wheel that is made with them
     collect_ignore = [
         "test_compile.py", "test_kernel_cache.py", "test_straight.py", "test_unasked_kernels.py", "test_wheel.py",
-        "test_ship.py", "dae/compiled/test_counted_arrays.py", "docs/test_asked_kernels.py", "native/test_ahead.py",
-        "native/test_systems.py",
+        "test_ship.py", "test_start.py", "dae/compiled/test_counted_arrays.py", "docs/test_asked_kernels.py",
+        "native/test_ahead.py", "native/test_systems.py",
     ]  # fmt: skip
 
 PAGE = Path(__file__).parent.parent / "docs" / "development.md"

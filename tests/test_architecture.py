@@ -100,8 +100,10 @@ EXCEPTIONS = {
 """Further arrows, and why."""
 
 CIRCLES = {
-    ("kernels.ahead", "kernels.calls", "kernels.jit"):
-        "a kernel that is not there is compiled when it is called",
+    ("kernels.ahead", "kernels.cache", "kernels.calls", "kernels.jit", "kernels.kinds", "kernels.library",
+     "kernels.own.jit", "kernels.own.views", "kernels.plain.jit", "kernels.plain.views", "kernels.structs",
+     "kernels.views"):
+        "a kernel that is not there is compiled when it is called, by what knows numba and is imported then",
     ("bearings.bearing", "bearings.rating"):
         "properties of Bearing, and the functions that carry them out",
     ("drivetrain.bodies", "drivetrain.build", "drivetrain.description", "drivetrain.drivetrain",

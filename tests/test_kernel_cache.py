@@ -260,12 +260,13 @@ def test_damaged_files(package):
 
 
 def test_what_makes_the_files_is_in_their_names(tmp_path, monkeypatch):
+    (tmp_path / "own").mkdir()
     for name in cache.MAKERS:
-        shutil.copy(Path(cache.__file__).with_name(f"{name}.py"), tmp_path)
+        shutil.copy(Path(cache.__file__).parent / f"{name}.py", tmp_path / f"{name}.py")
     known = cache.setting()
     monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
     assert cache.setting.__wrapped__() == known
-    with (tmp_path / "jit.py").open("a") as stream:
+    with (tmp_path / "own" / "jit.py").open("a") as stream:
         stream.write("CHANGED = True\n")
     assert cache.setting.__wrapped__() != known
 
@@ -273,13 +274,14 @@ def test_what_makes_the_files_is_in_their_names(tmp_path, monkeypatch):
 def test_patch_versions_make_no_other_names(monkeypatch):
     """What fits is told by minor versions of Python, numba and LLVM's wrapper, and by no version of numpy."""
     known = cache.setting()
-    for module in (cache.numba, cache.llvmlite):
-        minor, _, _ = module.__version__.rpartition(".")
-        with monkeypatch.context() as other:
-            other.setattr(module, "__version__", f"{minor}.987")
-            assert cache.setting.__wrapped__() == known
-            other.setattr(module, "__version__", "0.987.0")
-            assert cache.setting.__wrapped__() != known
+    version_of = cache.version_of
+    for library in ("numba", "llvmlite"):
+        minor, _, _ = version_of(library).rpartition(".")
+        for version, same in ((f"{minor}.987", True), ("0.987.0", False)):
+            with monkeypatch.context() as other:
+                told = {library: version}
+                other.setattr(cache, "version_of", lambda name, told=told: told.get(name) or version_of(name))
+                assert (cache.setting.__wrapped__() == known) is same
     with monkeypatch.context() as other:
         other.setattr(np, "__version__", "2.987.0")
         assert cache.setting.__wrapped__() == known
@@ -445,7 +447,7 @@ def test_symbols_have_the_same_names_in_all_processes():
     """A part is looked for by the name that its callers have on disk, whatever the process that has compiled it."""
     from numba.core.registry import cpu_target
 
-    from gearmbs.kernels.jit import _Flags
+    from gearmbs.kernels.own.jit import _Flags
 
     def flags(fastmath) -> _Flags:
         found = _Flags()

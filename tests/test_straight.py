@@ -7,7 +7,7 @@ import pytest
 
 from gearmbs.kernels import texts
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.straight import straight
+from gearmbs.kernels.own.straight import straight
 from tests.says import says
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from numba import types
-
 from gearmbs.contact import layout as L
 from gearmbs.contact.loads import add_product, add_transposed_product, clear_sums, mirror
 from gearmbs.contact.pair import side_contacts
@@ -13,6 +11,7 @@ from gearmbs.contact.root import root_contacts
 from gearmbs.contact.search import open_side, set_twist
 from gearmbs.dae.equations.loads.forces import DERIVATIVES, FORCE_SIG, FRAME_A, FRAME_COLUMNS, FRAME_P, FRAME_V, FRAME_W
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import caller
 from gearmbs.kernels.structs import matrix_at, vector_at
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64
 
 from gearmbs.contact import layout as L
 from gearmbs.contact.deviations import add_deviations, pair_stiffness_factor, roll_under_corner
@@ -19,6 +18,7 @@ from gearmbs.contact.sections import (
     helical_normals,
 )
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64
 
 _VEC, _MATRIX = float64[::1], float64[:, ::1]
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
+
+from gearmbs.kernels.kinds import types
 
 Table = Any
 """An array of numbers, or a list of them, which Python reads and writes one by one in a third of the time."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numba import float64, int64, types
 
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types
 
 # Dense output: the BDF polynomials of all steps, evaluated anywhere in the span.
 

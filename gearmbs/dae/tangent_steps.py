@@ -5,8 +5,6 @@ Parameters stand in groups of `LANES` side by side, so that what is the same for
 
 from __future__ import annotations
 
-from numba import float64, int64
-
 from gearmbs.dae.integrators.bdf import HISTORY, error_constant
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.several import solve_lanes
@@ -16,9 +14,10 @@ from gearmbs.dae.result import lagrange_weights
 from gearmbs.dae.tangent_jumps import look_for_jumps
 from gearmbs.dae.tangent_points import AFRESH, END_OF_STEP, SHORT
 from gearmbs.dae.tangent_track import BY, TRACK_TYPE, group_at, groups, lane_of, size_of_move, slot_of
-from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64
 from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, larger_number, magnitude, put_lanes
+from gearmbs.kernels.placed import unbound
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE
 
 TOGETHER = 3

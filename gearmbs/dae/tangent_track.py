@@ -163,7 +163,7 @@ class Track(Struct):
     lost_at: Vector
 
 
-TRACK_TYPE = Track.numba_type
+TRACK_TYPE = Track.kind
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)

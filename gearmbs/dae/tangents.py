@@ -40,7 +40,8 @@ from gearmbs.dae.tangent_points import AFRESH, END_OF_STEP, SHORT, points_of, sh
 from gearmbs.dae.tangent_steps import follow_run
 from gearmbs.dae.tangent_track import BY, Track
 from gearmbs.kernels.lanes import LANES
-from gearmbs.kernels.pointers import bind, direct, no_events, no_hook
+from gearmbs.kernels.placed import bind
+from gearmbs.kernels.pointers import direct, no_events, no_hook
 from gearmbs.kernels.structs import LINE
 
 NOTHING, ROUGH = 1e2 * EPS / BY, 1e-2

@@ -8,7 +8,6 @@ from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
-from numba.extending import is_jitted
 from scipy.sparse import csc_array, issparse
 
 from gearmbs.dae.integrators import differences
@@ -16,6 +15,7 @@ from gearmbs.dae.integrators.messages import moved_rates, unknown_name
 from gearmbs.dae.linalg.lu_plan import LUPlan, SingularMatrixError, analyse
 from gearmbs.dae.linalg.sparse_lu import LUFactors, factor, new_factors, solve
 from gearmbs.dae.problem import DAEProblem
+from gearmbs.kernels.jit import is_compiled
 from gearmbs.kernels.pointers import PythonCallback
 
 RATES_STEP = 1e-12
@@ -91,7 +91,7 @@ class _UserFunctions:
 
     def residual(self, fun: Callable) -> Callable:
         takes_p = _takes(fun, 4, "the residual")
-        if is_jitted(fun):
+        if is_compiled(fun):
             return differences.adapt_residual(fun, takes_p)
         extra = (self.parameters,) if takes_p else ()
 
@@ -110,7 +110,7 @@ class _UserFunctions:
         if jac is None:
             return differences.differenced(residual)
         takes_p = _takes(jac, 5, "the Jacobian")
-        if is_jitted(jac):
+        if is_compiled(jac):
             return differences.adapt_jacobian(jac, takes_p, dense)
         extra = (self.parameters,) if takes_p else ()
         n = self.n
@@ -123,7 +123,7 @@ class _UserFunctions:
 
     def events(self, functions: Sequence[Callable]) -> Callable:
         takes_p = [_takes(g, 3, "an event function") for g in functions]
-        if all(is_jitted(g) for g in functions):
+        if all(is_compiled(g) for g in functions):
             return differences.adapt_events(list(functions), takes_p)
         extras = [(self.parameters,) if p else () for p in takes_p]
 

@@ -39,7 +39,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations.kinematics import angle_gradient, counted_angle
 from gearmbs.dae.equations.loads.forces import (
@@ -55,6 +54,7 @@ from gearmbs.dae.equations.loads.forces import (
 from gearmbs.drivetrain.part import require
 from gearmbs.drivetrain.torque_text import LINEAR_SHARE, STATE_UNIT, torque_text
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import F8, VEC, caller
 from gearmbs.kernels.structs import vector_at
 from gearmbs.mechanism.language.syntax import Units

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from gearmbs.contact import GAP_COLUMNS, gear_contact, layout
 from gearmbs.gears.geometry import PairGeometry
@@ -16,6 +15,7 @@ from gearmbs.gears.modifications import COAST_ALIASES
 from gearmbs.gears.tables import pack
 from gearmbs.gears.transmission import StaticMesh, first_mate, load_of, static_lag, warn_of_unseen
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.units import Quantity
 
 SIDE, SECTION, GAP, ROLL_LENGTH_1, SOFT = (

@@ -22,8 +22,8 @@ NEWEST_KNOWN = (0, 68)
 STAND_INS = ("jit", "views", "lanes", "pointers")
 """Modules of which the plain mode has its own, in ``plain``."""
 
-WITH_PRIVATE_PARTS = ("jit", "views", "lanes")
-"""Those that show, when they are imported, whether numba has what the own stages use."""
+WITH_PRIVATE_PARTS = ("own.jit", "own.views", "own.lanes", "own.pointers")
+"""Modules that show, when they are imported, whether numba has what the own stages use."""
 
 
 def is_plain(chosen: str, found: str) -> bool:
@@ -70,14 +70,20 @@ def _numba() -> str:
 def _lacks_private_parts(chosen: str) -> bool:
     """Return whether numba has not what the own stages use, with a warning; what was imported of them is forgotten.
 
+    It is asked where numba has been imported, and where the own stages have not yet been used with this version.
+
     Raises
     ------
     ImportError
         If the own stages were asked for, or numba cannot be imported at all.
     """
     try:
+        cache = import_module(f"{__name__}.cache")
+        if "numba" not in sys.modules and cache.known():
+            return False
         for name in WITH_PRIVATE_PARTS:
             import_module(f"{__name__}.{name}")
+        cache.know()
     except (ImportError, AttributeError) as error:
         reason = f"numba {_numba()} has not what the usual mode of gearmbs uses ({error})"
         if chosen:
@@ -92,8 +98,7 @@ def _lacks_private_parts(chosen: str) -> bool:
 
 _chosen = os.environ.get(COMPILER, "")
 PLAIN = is_plain(_chosen, _numba())
-if not PLAIN and _lacks_private_parts(_chosen):
-    PLAIN = True
+PLAIN = PLAIN or _lacks_private_parts(_chosen)
 if PLAIN:
     # processes that this one starts need not say so again
     os.environ[COMPILER] = "plain"

@@ -6,18 +6,16 @@ import ctypes
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache
 from itertools import count
-from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 from uuid import uuid4
 
 import numpy as np
-from numba import types
-from numba.experimental import structref
 
 from gearmbs.dae.problem import EVENTS_SIG, HOOK_SIG, JACOBIAN_SIG, RESIDUAL_SIG
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
+from gearmbs.kernels.structs import Struct
 
 VEC = types.float64[::1]
 MAT = types.float64[:, ::1]
@@ -107,62 +105,17 @@ class PythonCallback:
 # in Python. A short run is over in less; so the addresses are looked up once for each problem.
 
 
-BOUND = 64
-"""Sets of functions kept bound."""
+class Functions(Struct):
+    """Addresses of residual, Jacobian, hook and events, with the signatures of `gearmbs.dae.problem`."""
+
+    residual: int
+    jacobian: int
+    hook: int
+    events: int
 
 
-@structref.register
-class FunctionsType(types.StructRef):
-    """Numba's type of `Functions`."""
-
-
-class Functions(structref.StructRefProxy):
-    """Residual, Jacobian, hook and events, with the signatures of `gearmbs.dae.problem`."""
-
-    def __new__(cls, residual, jacobian, hook, events):
-        """Return the bound functions."""
-        return structref.StructRefProxy.__new__(cls, residual, jacobian, hook, events)
-
-
-FIELDS = {
-    "residual": types.FunctionType(RESIDUAL_SIG),
-    "jacobian": types.FunctionType(JACOBIAN_SIG),
-    "hook": types.FunctionType(HOOK_SIG),
-    "events": types.FunctionType(EVENTS_SIG),
-}
-structref.define_proxy(Functions, FunctionsType, list(FIELDS))
-FUNCTIONS_TYPE = FunctionsType(list(FIELDS.items()))
-
-
-@njit(FUNCTIONS_TYPE(*FIELDS.values()), cache=True)
-def _bind(residual, jacobian, hook, events):
-    return Functions(residual, jacobian, hook, events)
-
-
-_binding = Lock()
-
-
-class FourFunctions(NamedTuple):
-    """The functions themselves: what is bound is counted by each compiled function that is handed it."""
-
-    residual: Any
-    jacobian: Any
-    hook: Any
-    events: Any
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def unbound(functions):
-    """Return the four functions, not counted; what binds them must outlive them."""
-    return FourFunctions(functions.residual, functions.jacobian, functions.hook, functions.events)
-
-
-@lru_cache(maxsize=BOUND)
-def bind(residual, jacobian, hook, events):
-    """Return the four compiled functions bound together, the same object for the same functions."""
-    # numba finds out types of functions with tables that only one thread at a time may fill
-    with _binding:
-        return _bind(residual, jacobian, hook, events)
+SIGNATURES = {"residual": RESIDUAL_SIG, "jacobian": JACOBIAN_SIG, "hook": HOOK_SIG, "events": EVENTS_SIG}
+FUNCTIONS_TYPE = Functions.kind
 
 
 @njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")

@@ -21,6 +21,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import json
 import os
 import pickle
 import platform
@@ -30,21 +31,20 @@ import types as python
 import uuid
 import zlib
 from collections.abc import Callable, Iterator
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import llvmlite
-import llvmlite.binding
-import numba
 import numpy as np
-from numba.core import config, dispatcher, serialize
 
+from gearmbs.kernels.kinds import Deferred, Kind, Signature
 from gearmbs.kernels.locks import held
 
-FORMAT = "4"
+FORMAT = "5"
 """To be raised when the files or what they hold change."""
 
-MAKERS = ("jit", "library", "cache", "late", "straight", "texts")
+MAKERS = ("own/jit", "library", "cache", "own/late", "own/straight", "texts")
 """Modules of this package that make what is kept; an edit of theirs makes all of it anew."""
 
 SHIPPED = Path(__file__).with_name("shipped")
@@ -53,14 +53,20 @@ SHIPPED = Path(__file__).with_name("shipped")
 COMMON = ("x86-64-v3", "")
 """Name and further instructions of the processor that they are made for."""
 
+COMMON_SYSTEM = "x86_64-unknown-linux-gnu"
+"""What LLVM calls the system that they are made for."""
+
 NEEDED = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt")
 """Instructions of `COMMON` beyond those of every 64-bit processor of Intel's kind (x86-64 psABI, level 3)."""
 
-OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
+OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK", "DEBUGINFO", "DEBUGINFO_DEFAULT")
 """Settings of numba's that change its machine code."""
 
-DISPATCHER: Any = dispatcher._DispatcherBase
-"""Kernels and functions of `numba.njit`: the class below the abstract one, whose test asks each object for its own."""
+SETTINGS_FILE = ".numba_config.yaml"
+"""A file of settings in the present folder that numba reads when it is imported."""
+
+CPU_FILE = Path("/proc/cpuinfo")
+"""What the system tells of its processors."""
 
 _parts: dict[str, Any] = {}
 
@@ -73,35 +79,124 @@ def target() -> tuple[str, str]:
     return COMMON if shipped() else _own_target()[1:]
 
 
+def option(name: str) -> str | None:
+    """Return a setting of numba's as it was given; None if it was not.
+
+    Numba need not be imported for it: its settings are variables of the environment, unless there is a file of them.
+    """
+    if "numba" not in sys.modules and not Path(SETTINGS_FILE).exists():
+        return os.environ.get(f"NUMBA_{name}") or None
+    from numba.core import config
+
+    found = getattr(config, name, None)
+    return None if found in (None, "") else str(found)
+
+
+def _target_file() -> Path:
+    """Return where it is kept what processor numba compiles for here."""
+    return own_folders(__package__.partition(".")[0])[-1] / f"target-{_surroundings()}.json"
+
+
+def known() -> bool:
+    """Return whether the own stages have been used here with this numba, or kernels came along that were made so."""
+    return SHIPPED.is_dir() or _target_file().exists()
+
+
+def know() -> None:
+    """Keep that the own stages work with this numba."""
+    _own_target()
+
+
+@functools.cache
 def _own_target() -> tuple[str, str, str]:
-    """Return the kind of system, and name and instructions of the processor that is compiled for here."""
-    return numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+    """Return the kind of system, and name and instructions of the processor that is compiled for here.
+
+    LLVM tells them; what it has told stands in a file from then on, under a digest of all it depends on.
+    """
+    file = _target_file()
+    if "numba" not in sys.modules:
+        with contextlib.suppress(OSError, ValueError):
+            system, name, features = json.loads(file.read_text(encoding="utf-8"))
+            return system, name, features
+    from numba.core.registry import cpu_target
+
+    found: tuple[str, str, str] = cpu_target.target_context.codegen().magic_tuple()
+    if not file.exists():
+        _write_whole(file, json.dumps(found).encode())
+    return found
+
+
+def _surroundings() -> str:
+    """Return a digest of what tells which processor numba compiles for: the machine, its versions and settings."""
+    try:
+        told = CPU_FILE.read_text(encoding="utf-8").partition("\n\n")[0]
+        # frequencies and the like change all the time
+        kept = ("vendor_id", "cpu family", "model", "stepping", "flags", "Features", "CPU")
+        machine = [line for line in told.splitlines() if line.startswith(kept)]
+    except OSError:
+        machine = [platform.processor()]
+    asked = [os.environ.get(f"NUMBA_{name}") for name in ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")]
+    with contextlib.suppress(OSError):
+        asked.append(Path(SETTINGS_FILE).read_text(encoding="utf-8"))
+    text = repr((platform.system(), platform.machine(), machine, version_of("numba"), version_of("llvmlite"), asked))
+    return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+@functools.cache
+def version_of(library: str) -> str:
+    """Return the version of an installed library, without importing it; nothing if there is none."""
+    found = getattr(sys.modules.get(library), "__version__", None)
+    if found is not None:
+        return str(found)
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return ""
+
+
+IN_FLAGS = {"bmi": "bmi1", "lzcnt": "abm"}
+"""What `CPU_FILE` calls instructions that LLVM calls otherwise."""
 
 
 def lacking() -> list[str]:
     """Return which instructions of `COMMON` the processor has not; nothing if no kernels came along."""
     if not SHIPPED.is_dir():
         return []
-    has = llvmlite.binding.get_host_cpu_features()
+    try:
+        lines = CPU_FILE.read_text(encoding="utf-8").splitlines()
+        flags = next((line for line in lines if line.startswith("flags")), "").partition(":")[2].split()
+        has = {name: IN_FLAGS.get(name, name) in flags for name in NEEDED}
+    except OSError:
+        import llvmlite.binding
+
+        has = llvmlite.binding.get_host_cpu_features()
     return [name for name in NEEDED if not has.get(name)]
 
 
 @functools.cache
 def shipped() -> bool:
     """Return whether kernels came along that run here, and none are asked for that are made for another processor."""
-    return SHIPPED.is_dir() and config.CPU_NAME is None and config.CPU_FEATURES is None and not lacking()
+    return SHIPPED.is_dir() and option("CPU_NAME") is None and option("CPU_FEATURES") is None and not lacking()
 
 
 @functools.cache
 def setting(processor: tuple[str, str] | None = None) -> str:
     """Return what all kernels for a processor depend on; default: the one that is compiled for here."""
-    system, *own = _own_target()
-    magic = (system, *(processor or own))
-    options = [(name, getattr(config, name, None)) for name in OPTIONS]
-    made_by = [hashlib.sha256(Path(__file__).with_name(f"{name}.py").read_bytes()).hexdigest() for name in MAKERS]
+    magic = (COMMON_SYSTEM, *processor) if processor else _own_target()
+    made_by = [hashlib.sha256((Path(__file__).parent / f"{name}.py").read_bytes()).hexdigest() for name in MAKERS]
     # a patch release changes no machine code that others have to fit
-    versions = [v.split(".")[:2] for v in (numba.__version__, llvmlite.__version__, platform.python_version())]
-    return repr((FORMAT, versions, magic, options, made_by))
+    told = (version_of("numba"), version_of("llvmlite"), platform.python_version())
+    versions = [v.split(".")[:2] for v in told]
+    return repr((FORMAT, versions, magic, _options(), made_by))
+
+
+def _options() -> list[tuple[str, Any]]:
+    """Return numba's settings that change its code, where any is given."""
+    if not Path(SETTINGS_FILE).exists() and not any(f"NUMBA_{name}" in os.environ for name in OPTIONS):
+        return []
+    from numba.core import config
+
+    return [(name, getattr(config, name, None)) for name in OPTIONS]
 
 
 _identities: dict[Any, str] = {}
@@ -120,6 +215,8 @@ _under_way = _UnderWay()
 
 def identity(function: Any) -> str:
     """Return a digest of a function, or kernel, and of all below it; of those that call each other as of any others."""
+    # numba's part of a kernel stands for that
+    function = vars(function).get("kernel", function)
     known = _identities.get(function)
     if known is not None:
         return known
@@ -141,7 +238,7 @@ def identity(function: Any) -> str:
 
 
 def _described(function: Any) -> str:
-    plain = function.py_func if isinstance(function, DISPATCHER) else function
+    plain = getattr(function, "py_func", function)
     names: list[str] = []
     code = _code(plain.__code__, plain.__doc__, names)
     found = []
@@ -150,7 +247,7 @@ def _described(function: Any) -> str:
             found.append((name, _token(plain.__globals__[name], names)))
     cells = [_token(cell.cell_contents, names) for cell in plain.__closure__ or ()]
     options: tuple = ()
-    if isinstance(function, DISPATCHER):
+    if plain is not function:
         options = (
             sorted((k, repr(v)) for k, v in function.targetoptions.items()),
             _declared(function),
@@ -167,12 +264,37 @@ def _declared(function: Any) -> str:
 
 def _type(kind: Any) -> str:
     """Return a text for a type; unlike its name it has the fields of named tuples."""
-    if isinstance(kind, numba.types.Dispatcher):
+    if kind is None:
+        return ""
+    if isinstance(kind, Kind):
+        return kind.told + (_source(VIEWS) if kind.structs else "")
+    from numba import types
+
+    if isinstance(kind, types.Dispatcher):
         return identity(kind.dispatcher)
-    fields = getattr(kind, "fields", "") if isinstance(kind, numba.types.BaseNamedTuple) else ""
-    inner = [_type(t) for t in kind.types] if isinstance(kind, numba.types.BaseTuple) else ""
+    fields = getattr(kind, "fields", "") if isinstance(kind, types.BaseNamedTuple) else ""
+    inner = [_type(t) for t in kind.types] if isinstance(kind, types.BaseTuple) else ""
     # types of one's own come with code that reads and writes their members
     return f"{kind} {fields} {inner} {_source(type(kind).__module__)}"
+
+
+VIEWS = f"{__package__}.own.views"
+"""The module of code that reads and writes members of structs."""
+
+
+def _is_compiled(value: Any) -> bool:
+    """Return whether a value is a kernel, or a function of `numba.njit`."""
+    kind = type(value)
+    known = hasattr(kind, "_compile_for_args") or kind.__module__.startswith(f"{__package__}.")
+    return known and isinstance(getattr(value, "py_func", None), python.FunctionType)
+
+
+def _is_numba_type(value: Any) -> bool:
+    if "numba" not in sys.modules:
+        return False
+    from numba import types
+
+    return isinstance(value, types.Type)
 
 
 def _code(code: python.CodeType, doc: str | None, names: list[str]) -> str:
@@ -189,14 +311,16 @@ def _code(code: python.CodeType, doc: str | None, names: list[str]) -> str:
 
 def _token(value: Any, names: list[str]) -> str:
     """Return a text that differs when what compiled code takes from a value differs."""
+    if isinstance(value, Signature):
+        return f"Signature [{_token(value.return_type, names)}, {_token(value.args, names)}]"
     if value is None or isinstance(value, (bool, int, float, complex, str, bytes, np.generic)):
         return f"{type(value).__name__} {value!r}"
     if isinstance(value, (tuple, list)):
         return f"{type(value).__qualname__} [{', '.join(_token(v, names) for v in value)}]"
     if isinstance(value, frozenset):
         return f"frozenset {sorted(_token(v, names) for v in value)}"
-    if isinstance(value, (DISPATCHER, python.FunctionType)):
-        plain = value.py_func if isinstance(value, DISPATCHER) else value
+    if isinstance(value, python.FunctionType) or _is_compiled(value):
+        plain = getattr(value, "py_func", value)
         if not _inside(plain.__module__):
             return f"{plain.__module__}.{plain.__qualname__}"
         if getattr(value, "late", False):
@@ -206,7 +330,9 @@ def _token(value: Any, names: list[str]) -> str:
         return identity(value) + ("" if plain is not value else _source(plain.__module__))
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()}"
-    if isinstance(value, numba.types.Type):
+    if isinstance(value, Deferred):
+        return f"{value} {[_token(one, names) for one in value.given]} {_source(value.module)}"
+    if isinstance(value, Kind) or _is_numba_type(value):
         return _type(value)
     if isinstance(value, np.dtype):
         return repr(value)
@@ -233,8 +359,13 @@ def _inside(module: str | None) -> bool:
 @functools.cache
 def _source(module: str) -> str:
     """Return a digest of a module's source, for objects that have no code of their own."""
+    if not _inside(module):
+        return ""
     file = getattr(sys.modules.get(module), "__file__", None)
-    if not _inside(module) or file is None:
+    if file is None and module.startswith(f"{__package__}."):
+        # of modules that are imported where something is compiled
+        file = getattr(find_spec(module), "origin", None)
+    if file is None:
         return ""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
@@ -244,7 +375,7 @@ def _source(module: str) -> str:
 
 def file_name(kernel: Any, kind: str, args: tuple, processor: tuple[str, str] | None = None) -> str:
     """Return the name of the file of an entry or part; default: for the processor that is compiled for here."""
-    told = [_type(t) for t in args]
+    told = [_type(t) for t in (args if kernel.declared is None else kernel.declared_types()[0])]
     text = repr((setting(processor), identity(kernel), kind, told))
     digest = hashlib.sha256(text.encode()).hexdigest()[:24]
     return f"{kernel.__module__.partition('.')[2] or kernel.__module__}.{kernel.__name__}-{digest}.{kind}"
@@ -264,8 +395,9 @@ def folders(package: str) -> tuple[Path, ...]:
 
 def own_folders(package: str) -> tuple[Path, ...]:
     """Return where kernels of a package are that were compiled by its users; the last one is where new ones go."""
-    if config.CACHE_DIR:
-        return (Path(config.CACHE_DIR) / package,)
+    chosen = option("CACHE_DIR")
+    if chosen:
+        return (Path(chosen) / package,)
     home = getattr(sys.modules.get(package), "__file__", None)
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearmbs" / package
     if home is None:
@@ -299,15 +431,20 @@ def _read(file: str, package: str) -> Any:
 
 
 def _write(file: str, package: str, payload: Any) -> None:
+    from numba.core import serialize
+
     data = serialize.dumps(payload)
-    data = zlib.crc32(data).to_bytes(4, "little") + data
-    folder = folders(package)[-1]
+    _write_whole(folders(package)[-1] / file, zlib.crc32(data).to_bytes(4, "little") + data)
+
+
+def _write_whole(file: Path, data: bytes) -> None:
+    """Write a file, or nothing of it where that cannot be."""
     with contextlib.suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        temporary = folder / f"{file}.{uuid.uuid4().hex[:12]}.tmp"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        temporary = file.with_name(f"{file.name}.{uuid.uuid4().hex[:12]}.tmp")
         try:
             temporary.write_bytes(data)
-            temporary.replace(folder / file)
+            temporary.replace(file)
         finally:
             temporary.unlink(missing_ok=True)
 
@@ -333,8 +470,7 @@ def _load(file: str, package: str, kind: str, rebuild: Callable) -> Any:
         return _parts[file]
     try:
         payload = _read(file, package)
-        target = numba.core.registry.cpu_target.target_context
-        made = None if payload is None else rebuild(target, package, file, payload)
+        made = None if payload is None else rebuild(package, file, payload)
     except Exception:
         # what cannot be rebuilt, for whatever reason, is compiled again and its file replaced
         made = None

@@ -18,18 +18,17 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from numba.types import Type, float32, float64, int16, int64
-
 from gearmbs.kernels import PLAIN
 from gearmbs.kernels.jit import Kernel
+from gearmbs.kernels.kinds import Kind, float32, float64, int16, int64
 
 MAKES_KERNELS = re.compile(
     r"^(?:from (?:[\w.]*jit|gearmbs\.contact\.records) import|import numba|from numba import .*\bnjit\b)", re.M
 )
-MAKERS = {f"kernels/{name}.py" for name in ("jit", "cache", "calls", "library", "late")}
+MAKERS = {f"kernels/{name}.py" for name in ("jit", "cache", "calls", "library", "own/jit", "own/late")}
 """Modules that make kernels and hold none."""
 OTHER_MODE = tuple(
-    f"gearmbs.kernels.{name}" for name in (("cache", "late", "library", "objects") if PLAIN else ("plain",))
+    f"gearmbs.kernels.{name}" for name in (("cache", "entries", "library", "objects", "own") if PLAIN else ("plain",))
 )
 """Where the modules are, or their names begin, that are not imported in this mode."""
 
@@ -195,7 +194,7 @@ LINKED = ("gearmbs.dae.integrators.differences:difference_matrix",)
 """Kernels that functions of a user's are compiled with, and no others: parts."""
 
 
-def asked() -> Iterator[tuple[Any, tuple[Type, ...]]]:
+def asked() -> Iterator[tuple[Any, tuple[Kind, ...]]]:
     """Yield the kernels that Python calls, each with the types of its arguments."""
     for name, told in ASKED.items():
         yield _kernel(name), told

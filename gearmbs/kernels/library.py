@@ -7,16 +7,19 @@ from its own code and all parts below it, optimised as a whole, and becomes the 
 from __future__ import annotations
 
 import functools
+import pickle
 import sys
 from types import SimpleNamespace
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import compiler, environment
+from numba.core import compiler, environment, serialize
 from numba.core.codegen import JITCodeLibrary
+from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python
 
 from gearmbs.kernels import cache
+from gearmbs.kernels.entries import Kept
 
 
 class _Ready(JITCodeLibrary):
@@ -130,9 +133,10 @@ class PartLibrary(_Linked):
         return code, part.fndesc, part.signature, environments, part.reload_init, tuple(library.parts), part.origins
 
     @staticmethod
-    def rebuild(target: Any, package: str, file: str, payload: tuple) -> SimpleNamespace | None:
+    def rebuild(package: str, file: str, payload: tuple) -> SimpleNamespace | None:
         """Return a part from what was kept of it; None if a part below it is gone."""
         code, fndesc, signature, environments, reload_init, parts, origins = payload
+        target = cpu_target.target_context
         for function in reload_init:
             function()
         target.refresh()
@@ -196,21 +200,28 @@ class EntryLibrary(_Linked, _Ready):
             for value in values
             if not value.is_declaration and value.linkage == llvm.Linkage.external
         ]
-        code = library._get_compiled_object()
-        return (
-            code,
-            fndesc,
-            _kept(compiled.environment),
-            compiled.signature,
-            compiled.reload_init,
-            environments,
-            defined,
+        own = compiled.environment
+        rest = (fndesc, compiled.signature, compiled.reload_init, defined, [_kept(own), *environments])
+        kept = {symbol: (module, constants, symbol) for module, constants, symbol in rest[-1]}
+        return tuple(
+            Kept(
+                library._get_compiled_object(),
+                fndesc.llvm_func_name,
+                fndesc.llvm_cpython_wrapper_name,
+                fndesc.qualname.split(".")[-1],
+                own.env_name,
+                list(kept.values()),
+                not compiled.reload_init,
+                serialize.dumps(rest),
+            )
         )
 
     @staticmethod
-    def rebuild(target: Any, package: str, file: str, payload: tuple) -> Any:
+    def rebuild(package: str, file: str, payload: tuple) -> Any:
         """Return a compile result from what was kept of it; only machine code is loaded."""
-        code, fndesc, own, signature, reload_init, environments, defined = payload
+        code, rest = payload[0], payload[-1]
+        fndesc, signature, reload_init, defined, (own, *environments) = pickle.loads(rest)
+        target = cpu_target.target_context
         for function in reload_init:
             function()
         _name_helpers()

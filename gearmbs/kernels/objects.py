@@ -110,7 +110,7 @@ def _ending(processor: str, triple: str = "") -> str:
     return KIND + re.sub(r"[^a-z0-9]", "_", told)
 
 
-def _rebuilt(target: Any, package: str, file: str, payload: tuple) -> Object:
+def _rebuilt(package: str, file: str, payload: tuple) -> Object:
     return Object(*payload)
 
 
@@ -212,7 +212,7 @@ def _brought_to(module: Any, triple: str, machine: Any) -> Any:
 
 
 def _late_names(module: Any) -> tuple[str, ...]:
-    """Return the names of the late kernels that a module may look for, see `gearmbs.kernels.late`."""
+    """Return the names of the late kernels that a module may look for, see `gearmbs.kernels.own.late`."""
     return tuple(sorted(set(re.findall(r'c"([\w.]+:\w+)\\00"', str(module)))))
 
 

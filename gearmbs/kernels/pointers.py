@@ -12,11 +12,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
-
 from gearmbs.kernels.bound import (
     F8,
     FUNCTIONS_TYPE,
@@ -26,11 +21,12 @@ from gearmbs.kernels.bound import (
     MAT,
     VEC,
     PythonCallback,
-    bind,
     named,
     no_events,
     no_hook,
 )  # fmt: skip
+from gearmbs.kernels.jit import Kernel
+from gearmbs.kernels.kinds import deferred, numba_of
 
 __all__ = [
     "F8",
@@ -42,7 +38,6 @@ __all__ = [
     "VEC",
     "PythonCallback",
     "address",
-    "bind",
     "call_address",
     "caller",
     "direct",
@@ -53,21 +48,12 @@ __all__ = [
 
 def caller(signature: Any) -> Any:
     """Return what turns an address, in compiled code, into a function of ``signature`` that can be called."""
-    function = types.FunctionType(signature)
+    return deferred("own.pointers", "caller", signature)
 
-    @intrinsic
-    def function_at(typingctx, address):
-        def codegen(context, builder, sig, args):
-            value = cgutils.create_struct_proxy(function)(context, builder)
-            null = cgutils.get_null_value(cgutils.voidptr_t)
-            value.c_addr = null
-            value.py_addr = null
-            value.jit_addr = builder.inttoptr(args[0], cgutils.voidptr_t)
-            return value._getvalue()
 
-        return function(types.int64), codegen
-
-    return function_at
+call_address = deferred("own.pointers", "call_address")
+"""``call_address(address, t, y, yp, extra, out)``: call the C function ``void f(double t, double *y, double *yp, double
+extra, double *out)``, a Python function behind a C function pointer."""
 
 
 @cache
@@ -79,7 +65,9 @@ def address(dispatcher: Any, signature: Any) -> int:
     KeyError
         If it was not compiled for ``signature``.
     """
-    compiled = dispatcher.overloads[signature.args]
+    if isinstance(dispatcher, Kernel):
+        return named(dispatcher.entry().address, dispatcher)
+    compiled = dispatcher.overloads[numba_of(signature).args]
     return named(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name), dispatcher)
 
 
@@ -95,31 +83,6 @@ def direct(kernel: Any) -> Callable:
 
     The caller answers for the types of the arguments.
     """
-    if not hasattr(kernel, "ready"):
-        # numba is switched off
-        return kernel
-    (entry,) = kernel.ready().overloads.values()
-    return entry.entry_point
-
-
-# Python functions behind C function pointers, called from compiled code.
-
-
-@intrinsic
-def call_address(typingctx, address, t, y, yp, extra, out):
-    """Call the C function ``void f(double t, double *y, double *yp, double extra, double *out)`` at ``address``."""
-    signature = types.void(types.int64, types.float64, y, yp, types.float64, out)
-
-    def codegen(context, builder, sig, args):
-        ll_double = context.get_value_type(types.float64)
-        ll_pointer = ll_double.as_pointer()
-        function_type = ir.FunctionType(ir.VoidType(), [ll_double, ll_pointer, ll_pointer, ll_double, ll_pointer])
-        function = builder.inttoptr(args[0], function_type.as_pointer())
-        pointers = [
-            context.make_array(ty)(context, builder, value).data
-            for ty, value in ((sig.args[2], args[2]), (sig.args[3], args[3]), (sig.args[5], args[5]))
-        ]
-        builder.call(function, [args[1], pointers[0], pointers[1], args[4], pointers[2]])
-        return context.get_dummy_value()
-
-    return signature, codegen
+    # what is no kernel is a plain function, where numba is switched off
+    call: Callable = kernel.entry().call if isinstance(kernel, Kernel) else kernel
+    return call

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -124,7 +125,8 @@ def current() -> list[str]:
 
 def _args(payload: tuple) -> tuple:
     """Return the types of arguments for which an entry or part was compiled."""
-    (signature,) = (one for one in payload if hasattr(one, "return_type"))
+    told = pickle.loads(payload[-1]) if isinstance(payload[-1], bytes) else payload
+    (signature,) = (one for one in told if hasattr(one, "return_type"))
     return tuple(signature.args)
 
 

@@ -12,13 +12,14 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeAlias, TypeVar
 
 import numpy as np
-from numba.extending import typeof_impl
 
-from gearmbs.kernels.views import StructType, matrix_at, uncounted, uncounted_rows, vector_at
+from gearmbs.kernels import kinds
+from gearmbs.kernels.views import matrix_at, uncounted, uncounted_rows, vector_at
 
 if TYPE_CHECKING:
     from _ctypes import _PyCStructType as RecordType
@@ -35,7 +36,6 @@ __all__ = [
     "IntVector",
     "Matrix",
     "Struct",
-    "StructType",
     "Vector",
     "matrix_at",
     "uncounted",
@@ -97,9 +97,12 @@ class _Members(RecordType):
         for member, slot in cls._slots.items():
             setattr(cls, member, property(slot.__get__, _setter(member, slot, *places[member])))
         arrays = tuple((member, *kind) for member, kind in cls.array_members.items())
-        # numba asks for it by the second name before it looks any further
-        cls.numba_type = cls._numba_type_ = StructType(name, tuple(cls.scalar_members.items()), arrays)
-        assert ctypes.sizeof(cls) == cls.numba_type.layout.itemsize
+        cls.kind = kinds.struct(name, tuple(cls.scalar_members.items()), arrays)
+
+    @property
+    def numba_type(cls: Any) -> Any:
+        """The type as numba knows it, for signatures of functions of `numba.njit`."""
+        return cls.kind.numba
 
 
 def _setter(name: str, slot: Any, kind: np.dtype, dimensions: int, place: int) -> Callable[[Any, Any], None]:
@@ -121,16 +124,15 @@ class Struct(ctypes.Structure, metaclass=_Members):
     ----------
     scalar_members, array_members : mapping
         Numpy kind of each scalar; kind and number of dimensions of each array.
-    numba_type : StructType
-        For signatures of compiled functions.
+    kind : Kind
+        For signatures of kernels; ``numba_type`` for those of `numba.njit`.
     """
 
     __slots__ = ("__weakref__",)
 
     scalar_members: ClassVar[Mapping[str, str]]
     array_members: ClassVar[Mapping[str, tuple[str, int]]]
-    numba_type: ClassVar[StructType]
-    _numba_type_: ClassVar[StructType]
+    kind: ClassVar[kinds.Kind]
     _arrays: ClassVar[Mapping[str, tuple[np.dtype, int, int]]]
     _slots: ClassVar[Mapping[str, Any]]
 
@@ -253,6 +255,9 @@ def _rebuild(cls: type[Struct], members: dict[str, Any]) -> Struct:
     return cls(**members)
 
 
-@typeof_impl.register(Struct)
-def _typeof(value, context):
-    return value.numba_type
+@cache
+def let_numba_know() -> None:
+    """Let numba know the types of structs, whose memory it would look at otherwise."""
+    from numba.extending import typeof_impl
+
+    typeof_impl.register(Struct)(lambda struct, context: type(struct).kind.numba)

@@ -17,8 +17,8 @@ from gearmbs.dae.integrators.run_state import copy, rows_from
 from gearmbs.dae.linalg.sparse_lu import solve
 from gearmbs.dae.problem import EPS
 from gearmbs.dae.result import Status
-from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.placed import unbound
 from gearmbs.kernels.pointers import caller
 from gearmbs.kernels.structs import IntVector, Struct, Vector
 from gearmbs.native.driver import BELOW_ROUNDING
@@ -51,7 +51,7 @@ class Afresh(Struct):
     settled: IntVector
 
 
-AFRESH_TYPE = Afresh.numba_type
+AFRESH_TYPE = Afresh.kind
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -19,8 +19,8 @@ from gearmbs.dae.integrators.stepping.memory import value_between
 from gearmbs.dae.integrators.stepping.reach import NOT_BEGUN, REACHED, drain, reach
 from gearmbs.dae.problem import EPS
 from gearmbs.dae.result import Status
-from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.placed import unbound
 from gearmbs.kernels.pointers import caller
 from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 
@@ -115,7 +115,7 @@ class Driver(Struct):
     scratch: Matrix
 
 
-DRIVER_TYPE = Driver.numba_type
+DRIVER_TYPE = Driver.kind
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

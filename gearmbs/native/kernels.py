@@ -6,8 +6,6 @@ import importlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from numba import float64, int64
-
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.integrators.algebraic.between import settle_output
 from gearmbs.dae.integrators.algebraic.part import PART_TYPE
@@ -26,6 +24,7 @@ from gearmbs.dae.model.evaluator import evaluate_rows
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.bound import FUNCTIONS_TYPE, NAMES
 from gearmbs.kernels.jit import Kernel
+from gearmbs.kernels.kinds import float64, int64
 from gearmbs.kernels.pointers import address, no_events, no_hook
 from gearmbs.mechanism.language.series import evaluate_series
 from gearmbs.mechanism.solve.simulator import Begun

@@ -22,7 +22,7 @@ from gearmbs.dae.linalg.lu_plan import NO_MODES, LUPlan, SingularMatrixError, an
 from gearmbs.dae.linalg.sparse_lu import LUFactors, new_factors
 from gearmbs.dae.model.evaluator import new_records, pattern
 from gearmbs.dae.problem import INPUT, DAEProblem, Number
-from gearmbs.kernels.bound import NAMES
+from gearmbs.kernels.bound import NAMES, SIGNATURES
 from gearmbs.kernels.lanes import LANES
 from gearmbs.mechanism.solve.simulator import Begun
 from gearmbs.native.afresh import Afresh
@@ -42,8 +42,6 @@ OPERATIONS = 6
 """Times the entries of a matrix that a factorisation may have operations: of the same up to 2.2."""
 POOL = 4
 """Times the room that the search for pivots begins with in Python, where it is doubled when it is full."""
-REFERENCED = 1
-"""Count of references to what is never given back."""
 
 PER_COLUMN = ("a_ptr", "u_ptr", "l_ptr", "pivot_ptr", "op_ptr", "div_ptr")
 OF_TAIL = (
@@ -243,13 +241,10 @@ def _state(begun: Begun) -> RunState:
 
 
 def _functions(image: Image, problem: DAEProblem, function: Callable[[Any], int]) -> int:
-    """Take in a stand-in for the functions bound together: a counted record with three words for each of the four."""
-    words = np.zeros(6 + 12, dtype=np.int64)
-    words[0], words[4] = REFERENCED, 96
-    number = image.array(words, STATE)
-    image.address_of(number, 8 * 3, number, 8 * 6)
-    for k, name in enumerate(("residual", "jacobian", "hook", "events")):
-        image.function_at(number, 8 * (6 + 3 * k + 2), function(name))
+    """Take in the addresses of the functions bound together."""
+    number = image.array(np.zeros(len(SIGNATURES), dtype=np.int64), STATE)
+    for k, name in enumerate(SIGNATURES):
+        image.function_at(number, 8 * k, function(name))
     return number
 
 

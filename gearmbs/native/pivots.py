@@ -118,7 +118,7 @@ class PlanRoom(Struct):
     signs: Vector
 
 
-ROOM_TYPE = PlanRoom.numba_type
+ROOM_TYPE = PlanRoom.kind
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -103,7 +103,7 @@ class Teller(Struct):
     tape_work: Vector
 
 
-TELLER_TYPE = Teller.numba_type
+TELLER_TYPE = Teller.kind
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

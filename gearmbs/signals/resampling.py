@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import float64, int16, int64, void
 
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int16, int64, void
 from gearmbs.signals.errors import SignalError
 from gearmbs.signals.filters import decimation_taps
 from gearmbs.signals.signal.signal import check_rate, make_signal

@@ -10,7 +10,6 @@ per output time, it gives reaction forces that are free of the integrator's nois
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.frames import is_elastic, own_rate, touches_elastic
@@ -48,6 +47,7 @@ from gearmbs.dae.equations.rotation import (
 )
 from gearmbs.dae.equations.unknowns import NUMBERS, add_number, put, put_pair
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
 from gearmbs.kernels.structs import matrix_at, vector_at
 

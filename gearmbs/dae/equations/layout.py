@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import namedtuple
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations.rotation import KIN_COLUMNS
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import IMAT, IVEC, MAT, VEC
 from gearmbs.kernels.structs import matrix_at, vector_at
 

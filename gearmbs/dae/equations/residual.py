@@ -22,7 +22,6 @@ lambda and mu.
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.body import add_wrench, body_residual
@@ -47,6 +46,7 @@ from gearmbs.dae.equations.rotation import (
 from gearmbs.dae.equations.unknowns import has_rate_rows, multipliers_are_rates, multipliers_of_row
 from gearmbs.dae.problem import RESIDUAL_SIG
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import F8, I8, VEC
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 

@@ -16,10 +16,9 @@ References
 
 from __future__ import annotations
 
-from numba import float64, int64, types
-
 from gearmbs.dae.result import lagrange_weights
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types
 from gearmbs.kernels.lanes import bits_of, double_of
 
 MAX_ORDER = 6

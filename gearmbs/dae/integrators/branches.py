@@ -7,15 +7,16 @@ pole the rates point at it, so that no solution leaves it, and a step that comes
 from __future__ import annotations
 
 import numpy as np
-from numba import boolean, float64, int64
 
 from gearmbs.dae.integrators.corrector import CONVERGED, HELD, ROUNDED_TERMS, correct, equations_hold
 from gearmbs.dae.integrators.newton_matrix import carry_over, renew_matrix
 from gearmbs.dae.integrators.run_state import STATE_TYPE, copy, rows_from
 from gearmbs.dae.linalg.sparse_lu import solve
 from gearmbs.dae.problem import EPS
-from gearmbs.kernels.bound import FUNCTIONS_TYPE, unbound
+from gearmbs.kernels.bound import FUNCTIONS_TYPE
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import boolean, float64, int64
+from gearmbs.kernels.placed import unbound
 
 UNFORESEEN = 100.0
 """Tolerances by which an algebraic unknown has to miss its prediction to be looked at."""

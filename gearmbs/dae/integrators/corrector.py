@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, void
 
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.controller import meets_kinks
@@ -12,6 +11,7 @@ from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
 from gearmbs.dae.problem import EPS
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, void
 from gearmbs.kernels.lanes import bits_of, double_of
 
 # Weights of the error test and of the corrector test, and norms with them.

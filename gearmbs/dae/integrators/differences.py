@@ -22,10 +22,10 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from numba import int64, types
 
 from gearmbs.dae.problem import EPS, EVENTS_SIG, JACOBIAN_SIG, RESIDUAL_SIG
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import int64, types
 from gearmbs.kernels.pointers import call_address
 
 # header of idata

@@ -38,7 +38,8 @@ from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, LUFactors, factor, new_fa
 from gearmbs.dae.problem import EPS, DAEProblem
 from gearmbs.dae.result import DAEResult, Kept, SolverStats, Status
 from gearmbs.kernels.bound import trying
-from gearmbs.kernels.pointers import address, bind, direct, no_events, no_hook
+from gearmbs.kernels.placed import bind
+from gearmbs.kernels.pointers import address, direct, no_events, no_hook
 
 FIRST_CHUNK = 16
 """Accepted steps, so that the first Ctrl-C is heeded within a second where a step takes 60 ms."""

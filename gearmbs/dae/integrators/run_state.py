@@ -300,7 +300,7 @@ class RunState(Struct):
     crossing_y: Matrix
 
 
-STATE_TYPE = RunState.numba_type
+STATE_TYPE = RunState.kind
 
 
 PER_UNKNOWN = (

@@ -9,7 +9,6 @@ Python can help: for new pivots, when a buffer is full, and after a change of co
 from __future__ import annotations
 
 import numpy as np
-from numba import int64
 
 from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
@@ -48,8 +47,9 @@ from gearmbs.dae.integrators.run_state import (
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.dae.problem import HISTORY_CHANGED
-from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import int64
+from gearmbs.kernels.placed import unbound
 from gearmbs.kernels.pointers import FUNCTIONS_TYPE
 
 MAX_FAILS = 16

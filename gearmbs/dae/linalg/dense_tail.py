@@ -10,9 +10,9 @@ other has its entries, so that lanes in which a diagonal lies are treated like a
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types, uint32
 
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types, uint32
 from gearmbs.kernels.lanes import LANES, all_lanes, bits_of, double_of, lanes_at, larger_number, magnitude, put_lanes
 from gearmbs.kernels.structs import vector_at
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import boolean, float64, int64, types, uint32
 
 from gearmbs.dae.linalg.pivoting import equilibrate
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import boolean, float64, int64, types, uint32
 
 _VEC = float64[::1]
 _IVEC = int64[::1]

@@ -12,10 +12,10 @@ within a step by how many there are before on the same block.
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types, uint32
 
 from gearmbs.dae.linalg.schedule import bounds_of, earliest_times, sorted_by, taken_in_order
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types, uint32
 from gearmbs.kernels.lanes import LANES
 
 SHARE = 0.6

@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numba import boolean, float64, int64
 
 from gearmbs.dae.linalg.entry_lists import RATE_ALLOWED
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import boolean, float64, int64
 from gearmbs.kernels.pointers import caller
 from gearmbs.kernels.structs import KEPT_LAYOUTS
 

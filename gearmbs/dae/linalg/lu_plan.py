@@ -6,7 +6,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import boolean, float64, int64, types, uint32
 
 from gearmbs.dae.linalg.condensed import COLUMN_AT, COLUMNS, GROUP, ROW_AT, ROWS
 from gearmbs.dae.linalg.condensed_lists import condensed_matrix, modes_apart, modes_first
@@ -24,6 +23,7 @@ from gearmbs.dae.linalg.entry_lists import (
 from gearmbs.dae.linalg.pivoting import CANCELLED, GROWTH_ALLOWED, LINES_TYPE, THRESHOLDS, Lines, choose_pivots
 from gearmbs.dae.linalg.plan_lists import LISTS, lists_of_plan
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import boolean, float64, int64, types, uint32
 from gearmbs.kernels.pointers import direct
 from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, IndexVector, IntVector, Struct, Vector
 
@@ -172,7 +172,7 @@ class LUPlan(Struct):
     limit: Vector
 
 
-PLAN_TYPE = LUPlan.numba_type
+PLAN_TYPE = LUPlan.kind
 
 
 NO_MODES = np.zeros(0, dtype=np.int64)

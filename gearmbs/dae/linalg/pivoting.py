@@ -15,9 +15,9 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types
 
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types
 from gearmbs.kernels.structs import IntVector, Struct, Vector
 
 THRESHOLDS = (0.01, 0.1, 0.5)
@@ -110,7 +110,7 @@ class Lines(Struct):
     full: bool
 
 
-LINES_TYPE = Lines.numba_type
+LINES_TYPE = Lines.kind
 
 
 @njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import boolean, float64, int64, types, uint32
 
 from gearmbs.dae.linalg.condensed import COLUMN_AT, COLUMNS, GROUP, ROW_AT, ROWS, SCHUR_AT
 from gearmbs.dae.linalg.condensed_lists import filled, groups_of, reduced_pattern
@@ -18,6 +17,7 @@ from gearmbs.dae.linalg.front_blocks import (
 )
 from gearmbs.dae.linalg.schedule import has_nodes, nodes, operations_in_order
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import boolean, float64, int64, types, uint32
 
 MOSTLY_NODES = 0.5
 """Share of L in nodes from which on a matrix with a tail is factored column by column. Of two shafts with 112

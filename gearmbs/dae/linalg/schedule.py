@@ -11,9 +11,9 @@ Columns of a dense tail form one level, the last: they act on each other in its 
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types, uint32
 
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types, uint32
 
 # Nodes of a sparse LU: columns in a row whose rows below are the same, so that they are eliminated together.
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.schedule import has_nodes
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.lanes import lanes_at, put_lanes
 from gearmbs.kernels.pointers import direct
 

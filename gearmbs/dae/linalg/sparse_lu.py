@@ -11,7 +11,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numba import float64, int64, types
 
 from gearmbs.dae.linalg.condensed import (
     condense,
@@ -38,6 +37,7 @@ from gearmbs.dae.linalg.dense_tail import (
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE, LUPlan
 from gearmbs.dae.linalg.schedule import has_nodes, through_node
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types
 from gearmbs.kernels.lanes import LANES, all_lanes, bits_of, double_of
 from gearmbs.kernels.pointers import direct
 from gearmbs.kernels.structs import KEPT_LAYOUTS, BlockLayout, Struct, Vector, vector_at
@@ -215,7 +215,7 @@ class LUFactors(Struct):
     moving: Vector
 
 
-FACTORS_TYPE = LUFactors.numba_type
+FACTORS_TYPE = LUFactors.kind
 
 
 @lru_cache(maxsize=KEPT_LAYOUTS)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, types
 
 from gearmbs.dae.equations.expressions.opcodes import ACC_A, ACC_ALPHA
 from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, types
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]

@@ -7,7 +7,6 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import float64, int64
 
 from gearmbs.dae.equations import accelerations as index1
 from gearmbs.dae.equations import layout as T
@@ -41,6 +40,7 @@ from gearmbs.dae.model.records import (
 )
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 if TYPE_CHECKING:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import float64, int64, void
 
 from gearmbs.dae.equations import fixed_axes as fx
 from gearmbs.dae.equations import layout as T
@@ -58,6 +57,7 @@ from gearmbs.dae.model.records import RECORDS_TYPE, Records
 from gearmbs.dae.model.system import counted_angles, turns_of_one
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, void
 from gearmbs.kernels.pointers import address
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 

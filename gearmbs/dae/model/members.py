@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import float64, int64, types, void
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.accelerations import ROW_RECORD
@@ -21,6 +20,7 @@ from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, P
 from gearmbs.dae.model.evaluator import Evaluator, new_records
 from gearmbs.dae.model.records import RECORDS_TYPE, Records
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types, void
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
 if TYPE_CHECKING:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.accelerations import ROW_PHI, ROW_RATE, ROW_RECORD
@@ -13,6 +12,7 @@ from gearmbs.dae.equations.bodies.body import displace_body
 from gearmbs.dae.equations.rotation import POSE_COLUMNS
 from gearmbs.dae.problem import EPS
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, types
 
 _VEC = float64[::1]
 _MAT = float64[:, ::1]

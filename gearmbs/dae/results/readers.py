@@ -7,10 +7,10 @@ that who takes them by components, as filters do, finds them in one piece.
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, void
 
 from gearmbs.dae.equations.rotation import matrix_of, put_turns
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, void
 from gearmbs.kernels.lanes import LANES
 
 SUM, INSIDE, ABOUT_AXIS, EULER = range(4)

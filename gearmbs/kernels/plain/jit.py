@@ -25,13 +25,18 @@ from typing import Any
 
 import numba
 from numba import types
-from numba.extending import intrinsic, typeof_impl
+from numba.extending import intrinsic, is_jitted, typeof_impl
 
 from gearmbs.kernels import locks
+from gearmbs.kernels.kinds import numba_of
 from gearmbs.logs import tell
 
-CompilationError = numba.NumbaError
-"""What numba raises where a function cannot be compiled."""
+
+def compilation_error() -> type[Exception]:
+    """Return what numba raises where a function cannot be compiled."""
+    found: type[Exception] = numba.NumbaError
+    return found
+
 
 OWN_OPTIONS = {"forceinline", "straight"}
 """Options of kernels that numba does not document, or has not; all that they change is time."""
@@ -47,7 +52,7 @@ _packages_held: list[str] = []
 def njit(signature_or_function: Any = None, *, cache: bool = False, late: bool = False, **options: Any) -> Any:
     """Compile a function for use from Python and from other kernels; arguments are those of `gearmbs.kernels.jit`."""
     if not cache or numba.config.DISABLE_JIT:
-        arguments = () if signature_or_function is None else (signature_or_function,)
+        arguments = () if signature_or_function is None else (numba_of(signature_or_function),)
         return numba.njit(*arguments, **{k: v for k, v in options.items() if k not in OWN_OPTIONS})
     if callable(signature_or_function) and not hasattr(signature_or_function, "return_type"):
         return Kernel(signature_or_function, None, options)
@@ -70,7 +75,7 @@ class Kernel:
 
     def __init__(self, function: Callable, declared: Any, options: dict[str, Any], late: bool = False) -> None:
         self.py_func = function
-        self.declared = declared
+        self.declared = numba_of(declared)
         self.late = late
         self.options = {k: v for k, v in options.items() if k not in OWN_OPTIONS}
         functools.update_wrapper(self, function)
@@ -130,7 +135,7 @@ class Kernel:
     def compile(self, signature: Any) -> None:
         """Compile or load what is to be called with some types."""
         with alone(self.__module__):
-            self.dispatcher.compile(signature)
+            self.dispatcher.compile(numba_of(signature))
 
     def __call__(self, *args: Any, **kws: Any) -> Any:
         """Call the compiled function."""
@@ -142,6 +147,11 @@ class Kernel:
     def caller(self) -> Any:
         """What stands for a late kernel in those that call it."""
         return _late(self)
+
+
+def is_compiled(function: Any) -> bool:
+    """Return whether a function is a kernel, or one that numba compiles."""
+    return isinstance(function, Kernel) or bool(is_jitted(function))
 
 
 def _found(module: str, name: str) -> Any:
@@ -231,6 +241,7 @@ def c_function(kernel: Any, signature: Any) -> Any:
     An exception cannot leave a C function. Kernels that are called so raise none; of other people's functions see
     `_guarded`.
     """
+    signature = numba_of(signature)
     with alone(getattr(kernel, "__module__", __name__)):
         found = _functions.get((kernel, signature))
         if found is None:
@@ -273,6 +284,7 @@ def _tell(name):
 
 def caller(signature: Any) -> Any:
     """Return what turns an address, in compiled code, into a function of ``signature`` that can be called."""
+    signature = numba_of(signature)
     function = types.ExternalFunctionPointer(signature, None)
     _called_by_address.add(signature)
 

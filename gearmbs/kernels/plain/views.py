@@ -21,6 +21,7 @@ from numba.extending import (
     unbox,
 )
 
+from gearmbs.kernels.kinds import numba_of
 from gearmbs.kernels.plain.jit import njit
 
 
@@ -173,7 +174,7 @@ def header(dtype: np.dtype, alignment: int = 1) -> Any:
 
 def numbers(scalar: Any) -> Any:
     """Return what sees all numbers of a table from its header on; they are not counted."""
-    pointer = placed(types.CPointer(scalar))
+    pointer = placed(types.CPointer(numba_of(scalar)))
 
     @njit(error_model="numpy")
     def of(header):

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations.loads.forces import FRAME_A, FRAME_COLUMNS, FRAME_P, FRAME_V, FRAME_W
 from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.results.frames import frame_motion
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import IVEC, MAT, VEC
 from gearmbs.kernels.structs import matrix_at, vector_at
 from gearmbs.mechanism.contacts import kernel

@@ -9,7 +9,6 @@ from typing import Any
 from weakref import WeakSet
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations.loads.forces import (
     DERIVATIVES,
@@ -23,7 +22,8 @@ from gearmbs.dae.equations.loads.forces import (
     Diagnostic,
 )
 from gearmbs.dae.problem import EPS, ModelError
-from gearmbs.kernels.jit import CompilationError, njit
+from gearmbs.kernels.jit import compilation_error, njit
+from gearmbs.kernels.kinds import numba_of, types
 from gearmbs.kernels.pointers import F8, MAT, VEC, address, caller
 from gearmbs.kernels.structs import matrix_at, vector_at
 from gearmbs.mechanism.forces.laws import LAW_DIAGNOSTICS, Derived, ForceLaw, derive_law
@@ -335,17 +335,18 @@ def _refusals() -> tuple[type[Exception], ...]:
     # of a statement that numba does not know, as an import: none of its other errors
     from numba.core.errors import UnsupportedBytecodeError
 
-    return CompilationError, UnsupportedBytecodeError, KeyError, TypeError, RuntimeError
+    return compilation_error(), UnsupportedBytecodeError, KeyError, TypeError, RuntimeError
 
 
 def _compiled(label: str, what: str, function: Any, signature: Any, expected: tuple[str, ...]) -> Any:
     """Return a function compiled for a signature; a division by zero gives no number and raises nothing."""
     python = getattr(function, "py_func", function)
     options = {key: value for key, value in getattr(function, "targetoptions", {}).items() if key in KEPT_OPTIONS}
+    wanted = numba_of(signature)
     dispatcher: Any = njit(error_model="numpy", nogil=True, **options)(python)
     try:
-        dispatcher.compile(signature.args)
-        found = dispatcher.overloads[signature.args].signature.return_type
+        dispatcher.compile(wanted.args)
+        found = dispatcher.overloads[wanted.args].signature.return_type
     except _refusals() as error:
         lines = [line for line in str(error).splitlines() if line.strip()]
         text = "\n".join(lines[:8])
@@ -360,7 +361,7 @@ def _compiled(label: str, what: str, function: Any, signature: Any, expected: tu
             f"{label}: numba cannot compile {what}, whose arguments are numbers and arrays of float64 "
             f"({', '.join(expected)}); {remedy}:\n{text}"
         ) from error
-    if found != signature.return_type:
+    if found != wanted.return_type:
         raise ModelError(f"{label}: {what} returns {found}; let it return nothing")
     return dispatcher
 

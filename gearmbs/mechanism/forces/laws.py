@@ -428,6 +428,6 @@ def straightened(function: Callable) -> Callable:
     """Return a kernel in the form that compiles in the least time."""
     if PLAIN:
         return function
-    from gearmbs.kernels.straight import straight
+    from gearmbs.kernels.own.straight import straight
 
     return straight(function)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numba import boolean, float64, int64, void
 
 from gearmbs.dae.equations.expressions.evaluate import angle_rates, eval_request, update_angles
 from gearmbs.dae.equations.expressions.tape import Tape
 from gearmbs.dae.results.frames import warn_of_doubtful_turns
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import boolean, float64, int64, void
 
 _VEC, _MAT, _CUBE = float64[::1], float64[:, ::1], float64[:, :, ::1]
 _INTS, _MASK = int64[::1], boolean[::1]

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import float64, void
 
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.results.watched import some_of
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, void
 from gearmbs.signals.resampling import MARGIN, EvenSamples
 from gearmbs.studies.case.case import Case
 from gearmbs.studies.run import rig

@@ -27,13 +27,13 @@ with sum_mn psi_k,m psi_l,n Y_min x Y_max in place of X_min x X_max for two mode
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.inertia import to_global
 from gearmbs.dae.equations.constraints.terms import cross3, dot3
 from gearmbs.dae.equations.rotation import KIN_A, KIN_ADOT, KIN_AXES, KIN_DW, KIN_R, KIN_V, KIN_W
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, put_lanes
 from gearmbs.kernels.pointers import I8, IMAT, MAT, VEC
 from gearmbs.kernels.structs import matrix_at, vector_at

@@ -10,13 +10,13 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.lane_lists import in_lanes, lanes_of, listed_sum, padded, without_rounding
 from gearmbs.dae.equations.constraints.terms import dot3
 from gearmbs.dae.equations.rotation import KIN_A, KIN_H, KIN_W
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, put_lanes
 from gearmbs.kernels.pointers import IVEC, VEC
 from gearmbs.kernels.structs import matrix_at, vector_at

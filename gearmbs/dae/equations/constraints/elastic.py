@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.frames import (
@@ -27,6 +26,7 @@ from gearmbs.dae.equations.constraints.terms import cross3, dot3
 from gearmbs.dae.equations.rotation import KIN_R
 from gearmbs.dae.equations.unknowns import put, put_pair
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import F8, I8, IMAT, IVEC, MAT, VEC
 from gearmbs.kernels.structs import uncounted, uncounted_rows
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.frames import is_elastic, touches_elastic
@@ -14,6 +13,7 @@ from gearmbs.dae.equations.loads import expressions
 from gearmbs.dae.equations.residual import S_GRADIENT, S_GRADIENT_T, S_HESSIAN, S_TERM, S_VECTOR
 from gearmbs.dae.equations.unknowns import has_rate_rows, multiplier_factor, multipliers_of_row, put
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import F8, I8, IVEC, VEC
 from gearmbs.kernels.structs import matrix_at, vector_at
 

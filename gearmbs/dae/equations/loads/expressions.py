@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from numba import types
-
 from gearmbs.dae.equations import layout as T
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import F8, I8, IVEC, MAT, VEC, address, caller
 from gearmbs.kernels.structs import vector_at
 

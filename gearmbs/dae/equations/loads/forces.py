@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from numba import types
-
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints.terms import cross3
 from gearmbs.dae.equations.loads.time_functions import cubic
 from gearmbs.dae.equations.rotation import KIN_R, KIN_V, KIN_W
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import F8, I8, IVEC, MAT, VEC, caller
 from gearmbs.kernels.structs import matrix_at, vector_at
 

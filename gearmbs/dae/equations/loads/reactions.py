@@ -12,12 +12,12 @@ multipliers' places in y.
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.constraints import terms
 from gearmbs.dae.equations.loads import expressions
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import types
 from gearmbs.kernels.pointers import I8, IVEC, MAT, VEC
 from gearmbs.kernels.structs import matrix_at, vector_at
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types
 
 from gearmbs.dae.integrators.algebraic.instant import settle, take
 from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.options import BESIDE
 from gearmbs.dae.result import combine, lagrange_weights
+from gearmbs.kernels.bound import FUNCTIONS_TYPE
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.pointers import FUNCTIONS_TYPE
+from gearmbs.kernels.kinds import float64, int64, types
+from gearmbs.kernels.placed import unbound
 
 FOLLOWED = 200
 """Parts of a step in which a branch is followed, at most."""
@@ -133,7 +134,7 @@ def note_failure(part, t):
     nogil=True,
     error_model="numpy",
 )
-def follow(functions, orders, nodes, rows, seen, last, idata, rdata, work):
+def follow(bound, orders, nodes, rows, seen, last, idata, rdata, work):
     """Let the hook look at the ends of steps among the rows behind ``seen`` up to ``last``; return which was the last.
 
     What it keeps in ``rdata``, as turns that are counted, is then as it was in the run. The other parameters are those
@@ -141,6 +142,7 @@ def follow(functions, orders, nodes, rows, seen, last, idata, rdata, work):
 
     Parameters
     ----------
+    bound : Functions
     orders, nodes, rows
         Order, time and unknowns of each stored step, shapes (m,), (m,) and (m, n).
     seen, last : int
@@ -152,7 +154,7 @@ def follow(functions, orders, nodes, rows, seen, last, idata, rdata, work):
             # where it changes the coordinates rows that are stored behind are in those already
             point[0, :] = rows[r]
             table[:] = idata
-            functions.hook(nodes[r], point, 1, table, rdata, work)
+            unbound(bound).hook(nodes[r], point, 1, table, rdata, work)
     return max(seen, last)
 
 
@@ -162,12 +164,13 @@ def follow(functions, orders, nodes, rows, seen, last, idata, rdata, work):
     nogil=True,
     error_model="numpy",
 )
-def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, seen, idata, rdata, work):
+def settle_on_steps(bound, part, times, ends, orders, nodes, rows, y, yp, seen, idata, rdata, work):
     """Write y and y' at ``times``, each on the polynomial of the step that ends in row ``ends[i]``, and settle them.
 
     Parameters
     ----------
-    functions, part
+    bound : Functions
+    part
         As of `settle`.
     times, ends, orders, nodes, rows, y, yp
         As of `gearmbs.dae.result.evaluate_many`, the times increasing.
@@ -180,9 +183,10 @@ def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, se
     -------
     seen : int
     """
+    functions = unbound(bound)
     for i in range(times.shape[0]):
         e = ends[i]
-        seen = follow(functions, orders, nodes, rows, seen, e - 1, idata, rdata, work)
+        seen = follow(bound, orders, nodes, rows, seen, e - 1, idata, rdata, work)
         k = orders[e]
         h = nodes[e] - nodes[e - 1]
         settle_between(
@@ -199,12 +203,13 @@ def settle_on_steps(functions, part, times, ends, orders, nodes, rows, y, yp, se
     nogil=True,
     error_model="numpy",
 )
-def settle_output(functions, part, t, y, yp, h, t_old, y_old, idata, rdata, work):
+def settle_output(bound, part, t, y, yp, h, t_old, y_old, idata, rdata, work):
     """Settle an output of an integrator that tells nothing between outputs.
 
     Where the iteration does not converge, the branch is followed on the chord from the output before, ``y_old`` at
     ``t_old``. The other parameters are those of `settle`.
     """
+    functions = unbound(bound)
     take(part, y, yp, part.told)
     if settle(functions, part, t, y, yp, h, idata, rdata, work):
         note_moves(part, t, y, h, rdata)

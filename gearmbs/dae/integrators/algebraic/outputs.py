@@ -21,7 +21,8 @@ from gearmbs.dae.integrators.algebraic.structure import (
 )
 from gearmbs.dae.integrators.messages import list_names
 from gearmbs.dae.problem import DAEProblem
-from gearmbs.kernels.pointers import bind, direct, no_events, no_hook
+from gearmbs.kernels.placed import bind
+from gearmbs.kernels.pointers import direct, no_events, no_hook
 
 CLOSER, NEARER = 0.25, 0.75
 """Part of the step over which an output at the start is solved for once more, and part of the distance to a value given

@@ -94,7 +94,7 @@ class AlgebraicPart(Struct):
     slope: Vector
 
 
-PART_TYPE = AlgebraicPart.numba_type
+PART_TYPE = AlgebraicPart.kind
 
 
 def new_part(m: int, n: int, nnz: int, entries: int, numbers: int) -> AlgebraicPart:

@@ -6,12 +6,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64, types
 
 from gearmbs.dae.integrators.differences import colour_columns
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.pointers import FUNCTIONS_TYPE, bind, direct, no_events, no_hook
+from gearmbs.kernels.kinds import float64, int64, types
+from gearmbs.kernels.placed import bind, unbound
+from gearmbs.kernels.pointers import FUNCTIONS_TYPE, direct, no_events, no_hook
 
 KNOWN = 64
 """Structures kept."""
@@ -42,12 +43,12 @@ _BOOLS = types.boolean[::1]
     ),
     cache=True,
 )
-def _probe(functions, t, y, yp, sizes, indptr, indices, columns, groups, by_y, by_rate, idata, rdata, work):
+def _probe(bound, t, y, yp, sizes, indptr, indices, columns, groups, by_y, by_rate, idata, rdata, work):
     """Mark which rows each unknown and each rate changes at one point, those moved together that share no row.
 
     Parameters
     ----------
-    functions : Functions
+    bound : Functions
     t : float
     y, yp : ndarray, shape (n,)
         The point.
@@ -67,7 +68,7 @@ def _probe(functions, t, y, yp, sizes, indptr, indices, columns, groups, by_y, b
     defined : bool
         Whether the equations are finite there.
     """
-    n = y.shape[0]
+    n, functions = y.shape[0], unbound(bound)
     base, moved = np.empty(n), np.empty(n)
     functions.residual(t, y, yp, base, idata, rdata, work)
     if not np.isfinite(base).all():

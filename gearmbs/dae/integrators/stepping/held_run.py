@@ -38,7 +38,6 @@ from gearmbs.dae.integrators.stepping.standing import (
     go_next,
     go_on,
     pack,
-    place_of_functions,
     steer_next,
     steer_on,
     unpack,
@@ -171,7 +170,7 @@ class HeldRun(Run):
         st, part = self.state, self.algebraic.part
         self._standing = Standing(
             state=ctypes.addressof(st), part=ctypes.addressof(part), advance=address_of_advance(),
-            functions=direct(place_of_functions)(self.functions), scalars=words_of(st), part_scalars=words_of(part),
+            functions=ctypes.addressof(self.functions), scalars=words_of(st), part_scalars=words_of(part),
             numbers=numbers, factor_numbers=np.zeros(0), cells=nothing, places=nothing, values=np.zeros(0),
             scratch=self._scratch,
         )  # fmt: skip

@@ -29,7 +29,6 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numba import boolean, float64, int64, types
 
 from gearmbs.dae.integrators.corrector import renew_weights, weighted_max
 from gearmbs.dae.integrators.restart import start_afresh
@@ -38,8 +37,10 @@ from gearmbs.dae.integrators.step import CLOSE
 from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, solve
 from gearmbs.dae.problem import EPS
-from gearmbs.kernels.bound import FUNCTIONS_TYPE, unbound
+from gearmbs.kernels.bound import FUNCTIONS_TYPE
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import boolean, float64, int64, types
+from gearmbs.kernels.placed import unbound
 
 TERMS = ANSWER - 1
 """Terms of the series at most, and of a mode that steps do not resolve as many as the order, see `CONVERGES`."""

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple, Protocol
 from weakref import ref
 
 import numpy as np
-from numba import float64, int64, types
 
 from gearmbs.dae.integrators.algebraic.between import settle_between, settle_output
 from gearmbs.dae.integrators.algebraic.outputs import AlgebraicOutputs
@@ -28,8 +27,11 @@ from gearmbs.dae.linalg.lu_plan import LUPlan, analyse
 from gearmbs.dae.linalg.sparse_lu import LUFactors, new_factors
 from gearmbs.dae.problem import DAEProblem, ModelError
 from gearmbs.dae.state import History
+from gearmbs.kernels.bound import FUNCTIONS_TYPE
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.pointers import FUNCTIONS_TYPE, direct
+from gearmbs.kernels.kinds import float64, int64, types
+from gearmbs.kernels.placed import unbound
+from gearmbs.kernels.pointers import direct
 
 ASKED = {
     "t_end", "h_max", "rtol", "max_order", "max_iterations", "max_steps", "n_events", "most_crossings", "fixed_leading",
@@ -443,15 +445,15 @@ def record_window(st: RunState) -> None:
     nogil=True,
     error_model="numpy",
 )  # fmt: skip
-def value_between(functions, part, t, t_old, y_old, h, nodes, rows, count, y, yp, idata, rdata, work):
+def value_between(bound, part, t, t_old, y_old, h, nodes, rows, count, y, yp, idata, rdata, work):
     """Write y and y' at ``t`` from the polynomial of the last step, through all its points.
 
     Parameters
     ----------
-    functions, part, t, t_old, y_old, h, nodes, rows, count, y, yp, idata, rdata, work
+    bound, part, t, t_old, y_old, h, nodes, rows, count, y, yp, idata, rdata, work
         As of `settle_between`.
     """
-    settle_between(functions, part, t, t_old, y_old, h, nodes, rows, 0, count, y, yp, idata, rdata, work)
+    settle_between(unbound(bound), part, t, t_old, y_old, h, nodes, rows, 0, count, y, yp, idata, rdata, work)
 
 
 def value_in(run: Remembers, last: LastStep, t: float) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types
 
 from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.bdf import HISTORY
@@ -22,6 +21,7 @@ from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.dae.result import combine, lagrange_weights
 from gearmbs.kernels.bound import FUNCTIONS_TYPE
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types
 from gearmbs.kernels.pointers import address, caller, direct
 
 CHUNK = 16

@@ -6,8 +6,6 @@ would take longer than some steps of a small model do.
 
 from __future__ import annotations
 
-from numba import boolean, float64, int64, types
-
 from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.bdf import HISTORY
 from gearmbs.dae.integrators.run_state import STATE_TYPE, WINDOW, copy
@@ -17,7 +15,8 @@ from gearmbs.dae.linalg.lu_plan import PLAN_TYPE
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE
 from gearmbs.kernels.bound import FUNCTIONS_TYPE
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.placed import counted_at, place_of, struct_at
+from gearmbs.kernels.kinds import boolean, float64, int64, types
+from gearmbs.kernels.placed import struct_at
 from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector
 from gearmbs.kernels.views import matrix_at, vector_at
 
@@ -69,22 +68,16 @@ class Standing(Struct):
     scratch: Matrix
 
 
-standing_at = struct_at(Standing.numba_type)
+standing_at = struct_at(Standing.kind)
 state_at = struct_at(STATE_TYPE)
 part_at = struct_at(PART_TYPE)
 plan_at = struct_at(PLAN_TYPE)
 factors_at = struct_at(FACTORS_TYPE)
-functions_at = counted_at(FUNCTIONS_TYPE)
+functions_at = struct_at(FUNCTIONS_TYPE)
 
 AHEAD = 4
 """More than the codes of `go_next` are less than zero."""
 _VEC = float64[::1]
-
-
-@njit(int64(FUNCTIONS_TYPE), cache=True, nogil=True, error_model="numpy")
-def place_of_functions(bound):
-    """Return the address of the functions of a DAE; what binds them has to outlive its use."""
-    return place_of(bound)
 
 
 @njit(int64(int64, float64), cache=True, nogil=True, error_model="numpy")

@@ -8,19 +8,14 @@ the compilation of late kernels nor grows by them; a call takes some nanoseconds
 from __future__ import annotations
 
 import ctypes
-import importlib
-import sys
-import traceback
 from types import SimpleNamespace
 from typing import Any
 
 import llvmlite.binding as llvm
 from llvmlite import ir
 from numba.core import funcdesc, typing
-from numba.core.compiler_lock import global_compiler_lock
 
-FINDER = "gearmbs_find_late_kernel"
-"""Symbol of what compiled code calls to find a late kernel."""
+from gearmbs.kernels.entries import FINDER, find_late
 
 _POINTER = ir.IntType(8).as_pointer()
 
@@ -80,21 +75,4 @@ def _call(module: ir.Module, context: Any, described: Any, address: str) -> None
     builder.ret(builder.call(found, function.args, tail=True))
 
 
-@ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p)
-def _find(slot: int, address: bytes) -> int | None:
-    """Compile or load a late kernel, write its address to a slot and return it; return None if this fails."""
-    module, _, name = address.decode().partition(":")
-    try:
-        with global_compiler_lock:
-            kernel = getattr(importlib.import_module(module), name).ready()
-            (entry,) = kernel.overloads.values()
-            found = entry.library.get_pointer_to_function(entry.fndesc.llvm_func_name)
-            ctypes.c_void_p.from_address(slot).value = found
-        return found
-    except BaseException:
-        # there is nobody to raise it to but compiled code, which raises an error of its own
-        traceback.print_exc(file=sys.stderr)
-        return None
-
-
-llvm.add_symbol(FINDER, ctypes.cast(_find, ctypes.c_void_p).value)
+llvm.add_symbol(FINDER, ctypes.cast(find_late, ctypes.c_void_p).value)
