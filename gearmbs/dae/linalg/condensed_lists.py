@@ -323,7 +323,13 @@ def reduced_pattern(indptr, indices, apart, groups, rows, columns):
                         e += 1
                         fills += 1
                     schur_at[at + k] = slot_of[i]
-        part[first:e].sort()
+        for p in range(first + 1, e):
+            # a library has no sorting of numpy's
+            i, q = part[p], p
+            while q > first and part[q - 1] > i:
+                part[q] = part[q - 1]
+                q -= 1
+            part[q] = i
         for p in range(first, e):
             # the ones are marked, since their place is known at the end alone
             slots[p] = 0 if slot_of[part[p]] == -2 else slot_of[part[p]] + 1
