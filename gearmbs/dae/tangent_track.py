@@ -163,7 +163,7 @@ class Track(Struct):
     lost_at: Vector
 
 
-TRACK_TYPE = Track.kind
+TRACK_TYPE = Track.struct_kind
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)

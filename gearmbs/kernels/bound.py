@@ -115,7 +115,7 @@ class Functions(Struct):
 
 
 SIGNATURES = {"residual": RESIDUAL_SIG, "jacobian": JACOBIAN_SIG, "hook": HOOK_SIG, "events": EVENTS_SIG}
-FUNCTIONS_TYPE = Functions.kind
+FUNCTIONS_TYPE = Functions.struct_kind
 
 
 @njit(HOOK_SIG, cache=True, nogil=True, error_model="numpy")

@@ -97,12 +97,12 @@ class _Members(RecordType):
         for member, slot in cls._slots.items():
             setattr(cls, member, property(slot.__get__, _setter(member, slot, *places[member])))
         arrays = tuple((member, *kind) for member, kind in cls.array_members.items())
-        cls.kind = kinds.struct(name, tuple(cls.scalar_members.items()), arrays)
+        cls.struct_kind = kinds.struct(name, tuple(cls.scalar_members.items()), arrays)
 
     @property
     def numba_type(cls: Any) -> Any:
         """The type as numba knows it, for signatures of functions of `numba.njit`."""
-        return cls.kind.numba
+        return cls.struct_kind.numba
 
 
 def _setter(name: str, slot: Any, kind: np.dtype, dimensions: int, place: int) -> Callable[[Any, Any], None]:
@@ -124,7 +124,7 @@ class Struct(ctypes.Structure, metaclass=_Members):
     ----------
     scalar_members, array_members : mapping
         Numpy kind of each scalar; kind and number of dimensions of each array.
-    kind : Kind
+    struct_kind : Kind
         For signatures of kernels; ``numba_type`` for those of `numba.njit`.
     """
 
@@ -132,7 +132,7 @@ class Struct(ctypes.Structure, metaclass=_Members):
 
     scalar_members: ClassVar[Mapping[str, str]]
     array_members: ClassVar[Mapping[str, tuple[str, int]]]
-    kind: ClassVar[kinds.Kind]
+    struct_kind: ClassVar[kinds.Kind]
     _arrays: ClassVar[Mapping[str, tuple[np.dtype, int, int]]]
     _slots: ClassVar[Mapping[str, Any]]
 
@@ -260,4 +260,4 @@ def let_numba_know() -> None:
     """Let numba know the types of structs, whose memory it would look at otherwise."""
     from numba.extending import typeof_impl
 
-    typeof_impl.register(Struct)(lambda struct, context: type(struct).kind.numba)
+    typeof_impl.register(Struct)(lambda struct, context: type(struct).struct_kind.numba)

@@ -51,7 +51,7 @@ class Afresh(Struct):
     settled: IntVector
 
 
-AFRESH_TYPE = Afresh.kind
+AFRESH_TYPE = Afresh.struct_kind
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

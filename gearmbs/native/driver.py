@@ -115,7 +115,7 @@ class Driver(Struct):
     scratch: Matrix
 
 
-DRIVER_TYPE = Driver.kind
+DRIVER_TYPE = Driver.struct_kind
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

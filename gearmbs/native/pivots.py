@@ -118,7 +118,7 @@ class PlanRoom(Struct):
     signs: Vector
 
 
-ROOM_TYPE = PlanRoom.kind
+ROOM_TYPE = PlanRoom.struct_kind
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -103,7 +103,7 @@ class Teller(Struct):
     tape_work: Vector
 
 
-TELLER_TYPE = Teller.kind
+TELLER_TYPE = Teller.struct_kind
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

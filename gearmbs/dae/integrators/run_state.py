@@ -300,7 +300,7 @@ class RunState(Struct):
     crossing_y: Matrix
 
 
-STATE_TYPE = RunState.kind
+STATE_TYPE = RunState.struct_kind
 
 
 PER_UNKNOWN = (

@@ -172,7 +172,7 @@ class LUPlan(Struct):
     limit: Vector
 
 
-PLAN_TYPE = LUPlan.kind
+PLAN_TYPE = LUPlan.struct_kind
 
 
 NO_MODES = np.zeros(0, dtype=np.int64)

@@ -110,7 +110,7 @@ class Lines(Struct):
     full: bool
 
 
-LINES_TYPE = Lines.kind
+LINES_TYPE = Lines.struct_kind
 
 
 @njit(types.void(int64, int64, _IVEC, _IVEC, _IVEC), cache=True, nogil=True, error_model="numpy")

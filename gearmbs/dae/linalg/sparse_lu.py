@@ -215,7 +215,7 @@ class LUFactors(Struct):
     moving: Vector
 
 
-FACTORS_TYPE = LUFactors.kind
+FACTORS_TYPE = LUFactors.struct_kind
 
 
 @lru_cache(maxsize=KEPT_LAYOUTS)

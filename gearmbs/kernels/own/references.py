@@ -97,9 +97,9 @@ class Origins:
             # those of this package see what others keep
             inside = callee.typing_key._defn.__module__.startswith("gearmbs.kernels.")
             return frozenset() if inside else found | {_MADE}
-        kernel = callee.dispatcher if isinstance(callee, types.Dispatcher) else None
+        kernel: Any = callee.dispatcher if isinstance(callee, types.Dispatcher) else None
+        # numba's own dispatchers have no parts
         if hasattr(kernel, "part"):
-            # of this package; numba's own have none
             origins = UNKNOWN if kernel.late else kernel.part(self._calltypes[call].args).origins
             passed = found if _HANDED in origins else frozenset()
             return passed | {_MADE} if origins else frozenset()

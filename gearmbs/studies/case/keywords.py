@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, TypedDict
 
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
     from gearmbs.gears.faults import Fault
     from gearmbs.units import QuantityLike
 
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
     Each = QuantityLike | Sequence[QuantityLike]
     # a number, or points (time, value)
     Curve = QuantityLike | Sequence[Sequence[QuantityLike]]
-    OneFault = str | Fault | Mapping[str, object]
+    OneFault: TypeAlias = str | Fault | Mapping[str, object]
 
 
 class GearsKeywords(TypedDict, total=False):

@@ -94,7 +94,7 @@ class AlgebraicPart(Struct):
     slope: Vector
 
 
-PART_TYPE = AlgebraicPart.kind
+PART_TYPE = AlgebraicPart.struct_kind
 
 
 def new_part(m: int, n: int, nnz: int, entries: int, numbers: int) -> AlgebraicPart:

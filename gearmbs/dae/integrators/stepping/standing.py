@@ -68,7 +68,7 @@ class Standing(Struct):
     scratch: Matrix
 
 
-standing_at = struct_at(Standing.kind)
+standing_at = struct_at(Standing.struct_kind)
 state_at = struct_at(STATE_TYPE)
 part_at = struct_at(PART_TYPE)
 plan_at = struct_at(PLAN_TYPE)
