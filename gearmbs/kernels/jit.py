@@ -214,6 +214,7 @@ class Kernel:
         found = self.__dict__.get("_dispatcher")
         if found is None:
             make = importlib.import_module("gearmbs.kernels.own.jit").Dispatcher
+            importlib.import_module("gearmbs.kernels.structs").let_numba_know()
             with _opening:
                 found = self.__dict__.get("_dispatcher")
                 if found is None:
@@ -224,6 +225,11 @@ class Kernel:
     def _numba_type_(self) -> Any:
         """Numba's type of the kernel where compiled code names it, or is handed it."""
         return self.dispatcher._numba_type_
+
+    def __wrapper_address__(self) -> int:
+        """Return the address that numba calls where it is handed the kernel as a function of a declared type."""
+        found = self.dispatcher.get_compile_result(kinds.numba_of(self.signature))
+        return found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name)
 
     def part(self, args: tuple) -> Any:
         """Return the part for some types of arguments; compile or load it if needed."""
@@ -300,5 +306,5 @@ def _test(kind: Any, name: str, space: dict[str, Any]) -> str:
         return " and ".join([f"type({name}) is {own} and len({name}) == {len(inner)}", *inner])
     if kind.form == "struct":
         space[own] = kind
-        return f"getattr(type({name}), 'kind', None) == {own}"
+        return f"getattr(type({name}), 'struct_kind', None) == {own}"
     return "False"

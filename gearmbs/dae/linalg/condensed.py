@@ -17,9 +17,9 @@ each body. Rows of these stand in lanes, and modes in lanes in the columns; both
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types, uint32
 
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types, uint32
 from gearmbs.kernels.lanes import LANES, all_lanes, lanes_at, put_lanes
 from gearmbs.kernels.structs import vector_at
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import float64, int64, types, uint32
 
 from gearmbs.dae.linalg.condensed import (
     COLUMN_AT,
@@ -34,6 +33,7 @@ from gearmbs.dae.linalg.condensed import (
     places_in_group,
 )
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.kinds import float64, int64, types, uint32
 from gearmbs.kernels.lanes import LANES
 
 FEWEST = 4
