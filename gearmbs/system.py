@@ -134,6 +134,11 @@ def processor_name() -> str:
 # processes
 
 
+def is_linux_on_x86_64() -> bool:
+    """Return whether this is Linux on a 64-bit processor of Intel's kind."""
+    return (sys.platform, platform.machine()) == ("linux", "x86_64")
+
+
 def knows_processes() -> bool:
     """Return whether a process of this machine can be asked for: on Windows signal 0, which does it, is Ctrl-C."""
     return not WINDOWS

@@ -40,6 +40,7 @@ import numpy as np
 
 from gearmbs.kernels.kinds import Deferred, Kind, Signature
 from gearmbs.kernels.locks import held
+from gearmbs.system import PROC
 
 FORMAT = "5"
 """To be raised when the files or what they hold change."""
@@ -65,7 +66,7 @@ OPTIONS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "BOUNDSCHECK"
 SETTINGS_FILE = ".numba_config.yaml"
 """A file of settings in the present folder that numba reads when it is imported."""
 
-CPU_FILE = Path("/proc/cpuinfo")
+CPU_FILE = PROC / "cpuinfo"
 """What the system tells of its processors."""
 
 _parts: dict[str, Any] = {}

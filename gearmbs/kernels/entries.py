@@ -18,7 +18,6 @@ import importlib.util
 import mmap
 import os
 import pickle
-import platform
 import sys
 import sysconfig
 import traceback
@@ -28,10 +27,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gearmbs.system import is_linux_on_x86_64
+
 FINDER = "gearmbs_find_late_kernel"
 """Symbol of what compiled code calls to find a late kernel; see `gearmbs.kernels.own.late`."""
 
-HERE = (sys.platform, platform.machine()) == ("linux", "x86_64")
+HERE = is_linux_on_x86_64()
 """Whether objects are loaded here."""
 
 
