@@ -28,12 +28,14 @@ def note() -> None:
     from numba.core import sigutils
 
     from gearmbs.kernels.jit import Kernel
+    from gearmbs.kernels.kinds import numba_of
 
     compiled = Kernel.compile
 
     def noted(kernel, signature):
         if kernel.__module__.startswith("gearmbs."):
-            types = ", ".join(map(str, sigutils.normalize_signature(signature)[0]))
+            open_to = sigutils.normalize_signature(numba_of(signature)) if kernel.declared is None else None
+            types = ", ".join(map(str, (open_to or kernel.declared_types())[0]))
             with open(file, "a", encoding="utf-8") as notes:
                 notes.write(f"{kernel.__module__}:{kernel.__name__}\t{types}\n")
         return compiled(kernel, signature)
