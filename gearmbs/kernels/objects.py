@@ -16,6 +16,7 @@ from numba.core import compiler
 from numba.core.compiler_lock import global_compiler_lock
 
 from gearmbs.kernels import cache
+from gearmbs.kernels.kinds import numba_of
 from gearmbs.kernels.library import EntryLibrary
 
 NATIVE = "native"
@@ -140,7 +141,8 @@ def object_of_function(function: Any, processor: str, signature: Any, name: str,
         target = function.targetctx
         code = _ObjectLibrary(target.codegen(), function.py_func.__qualname__)
         code.enable_object_caching()
-        args, result = tuple(signature.args), signature.return_type
+        wanted = numba_of(signature)
+        args, result = tuple(wanted.args), wanted.return_type
         compiled = compiler.compile_extra(
             function.typingctx, target, function.py_func, args, result, flags, {}, code, compiler.Compiler
         )
