@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import llvmlite.binding
 import pytest
 
 import gearmbs
@@ -197,23 +198,36 @@ def test_announced_once(missing, monkeypatch, capsys):
 
 @pytest.mark.slow
 def test_a_processor_without_what_shipped_kernels_need_is_told(missing, monkeypatch, capsys, tmp_path):
+    """The system tells of its processor, or LLVM does where the system tells nothing."""
     monkeypatch.setattr(compiling, "compile_entries", lambda wanted, report: None)
     monkeypatch.setattr(cache, "SHIPPED", tmp_path)
-    for chosen in ("CPU_NAME", "CPU_FEATURES"):
-        monkeypatch.setattr(cache.config, chosen, None)
-    has = dict.fromkeys(cache.NEEDED, True)
-    monkeypatch.setattr(cache.llvmlite.binding, "get_host_cpu_features", lambda: has)
+    chosen: dict[str, str] = {}
+    monkeypatch.setattr(cache, "option", chosen.get)
+    monkeypatch.setattr(cache, "CPU_FILE", tmp_path / "cpuinfo")
+    flags = {name: cache.IN_FLAGS.get(name, name) for name in cache.NEEDED}
+    told = "processor : {}\nflags : fpu {}\n\n"
+
+    def with_flags(names):
+        cache.CPU_FILE.write_text("".join(told.format(k, " ".join(names)) for k in range(2)))
+
+    with_flags(flags.values())
     assert cache.shipped.__wrapped__()
     assert compiling.compile_missing(missing)
     assert "has no" not in capsys.readouterr().err
-    has["fma"] = False
+    with_flags(flag for name, flag in flags.items() if name != "lzcnt")
     assert not cache.shipped.__wrapped__()
     assert compiling.compile_missing(missing)
     said = capsys.readouterr().err
     assert "x86-64-v3" in said
-    assert "has no fma" in said
+    assert "has no lzcnt" in said
+    cache.CPU_FILE.unlink()
+    has = dict.fromkeys(cache.NEEDED, True)
+    monkeypatch.setattr(llvmlite.binding, "get_host_cpu_features", lambda: has)
+    assert cache.shipped.__wrapped__()
+    has["fma"] = False
+    assert cache.lacking() == ["fma"]
     has["fma"] = True
-    monkeypatch.setattr(cache.config, "CPU_NAME", "generic")
+    chosen["CPU_NAME"] = "generic"
     assert not cache.shipped.__wrapped__()
 
 

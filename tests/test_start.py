@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+import textwrap
 
 import numba
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from gearmbs.dae.equations.rotation import rotation_matrix
 from gearmbs.kernels import PLAIN, cache, entries
 from gearmbs.kernels.kinds import float64, int64, named_tuple, types, void
+from tests.test_kernel_cache import Package
 
 pytestmark = pytest.mark.skipif(PLAIN or not entries.HERE, reason="numba loads kernels here")
 
@@ -39,10 +41,61 @@ assert (before == own).all() and (before == after).all()
 """
 
 
-def run(program: str) -> str:
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=300)
+LATE = """
+    from gearmbs.kernels.jit import njit
+
+    @njit("float64(float64)", cache=True, late=True)
+    def late(x):
+        return 2.0 * x
+
+    @njit("float64(float64)", cache=True, nogil=True)
+    def caller(x):
+        return late(x) + 1.0
+"""
+FORKED = """
+import os
+from smallpackage.lately import caller, late
+caller.ready()
+child = os.fork()
+if not child:
+    # what stands at places that the parent knows nothing of, until it maps something else there
+    kept = [bytearray(1 << 20) for _ in range(50)]
+    os._exit(caller(1.0) != 3.0)
+assert os.waitpid(child, 0)[1] == 0
+assert late._entry is None
+assert caller(2.0) == 5.0
+"""
+IN_THREADS = """
+import threading
+from smallpackage.lately import caller
+found, start = [], threading.Barrier(8)
+
+def call():
+    start.wait()
+    found.append((caller.entry().address, caller(1.0)))
+
+threads = [threading.Thread(target=call) for _ in range(8)]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+assert set(found) == {(caller.entry().address, 3.0)}
+"""
+
+
+def run(program: str, environment: dict[str, str] | None = None) -> str:
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, env=environment)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", [FORKED, IN_THREADS], ids=["fork", "threads"])
+def test_processes_and_threads_find_late_kernels_for_themselves(program, tmp_path):
+    """A fork finds addresses that its parent has not; threads that load a kernel at once have the same of it."""
+    package = Package(tmp_path)
+    package.write("lately", textwrap.dedent(LATE))
+    run("from smallpackage.lately import caller, late; late.ready(), caller.ready()", package.environment)
+    assert run(program, package.environment) == ""
 
 
 def test_the_pair_of_the_paper_runs_without_numba():

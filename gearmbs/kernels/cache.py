@@ -45,7 +45,7 @@ from gearmbs.system import PROC
 FORMAT = "5"
 """To be raised when the files or what they hold change."""
 
-MAKERS = ("own/jit", "library", "cache", "own/late", "own/straight", "texts")
+MAKERS = ("own/jit", "own/references", "library", "cache", "own/late", "own/straight", "texts")
 """Modules of this package that make what is kept; an edit of theirs makes all of it anew."""
 
 SHIPPED = Path(__file__).with_name("shipped")

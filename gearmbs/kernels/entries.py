@@ -275,7 +275,8 @@ class _Image:
             end = int(starts[number] + sections["size"][number])
         common = symbols["section"] == _COMMON
         shared = -(-end // 64) * 64 + np.concatenate([[0], np.cumsum(-(-symbols["size"][common] // 64) * 64)])
-        memory = mmap.mmap(-1, max(int(shared[-1]), 1))
+        # not shared with a fork: each process notes addresses of late kernels that are its own
+        memory = mmap.mmap(-1, max(int(shared[-1]), 1), flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
         for number in np.flatnonzero(placed & (sections["type"] != _NO_BITS)):
             start, size, offset = (
                 int(x) for x in (starts[number], sections["size"][number], sections["offset"][number])

@@ -192,7 +192,9 @@ class Kernel:
                 numbas = self.dispatcher.entry()
                 # what was compiled is taken as from the disk, as everywhere else
                 found = self._kept() or numbas
-            self._entry = found
+            with _opening:
+                # of threads that have come this far at once the first counts: others may have its address
+                self._entry = self._entry or found
         return self._entry.call
 
     def _kept(self) -> entries.Entry | None:

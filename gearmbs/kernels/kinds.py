@@ -283,12 +283,7 @@ class Deferred:
     @cached_property
     def _numba_type_(self) -> Any:
         """Numba's type of it."""
-        from numba.core.registry import cpu_target
-
-        context, made = cpu_target.typing_context, self.made
-        # what has just been made is registered, and known once that has been looked through
-        context.refresh()
-        return context.resolve_value_type(made)
+        return importlib.import_module("gearmbs.kernels.own.jit").type_of(self.made)
 
     def __repr__(self) -> str:
         return f"{self.module}.{self.name}"

@@ -18,7 +18,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.cpu_options import FastMathOptions
 from numba.core.ir_utils import get_definition, guard
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.typed_passes import NativeLowering, NopythonTypeInference
 from numba.core.untyped_passes import ExtractByteCode
 
@@ -240,6 +240,14 @@ class Dispatcher(CPUDispatcher):
         if compiled.typing_error is not None:
             raise compiled.typing_error
         return compiled
+
+
+def type_of(made: Any) -> Any:
+    """Return numba's type of an intrinsic, or kernel, that may have just been made."""
+    context = cpu_target.typing_context
+    # what is registered is known once that has been looked through
+    context.refresh()
+    return context.resolve_value_type(made)
 
 
 class _Flags(compiler.Flags):

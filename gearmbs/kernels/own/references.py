@@ -5,8 +5,9 @@ entry and on exit, in each kernel that is inlined. But whoever calls a kernel ke
 returns, so that an argument may be seen as `gearmbs.kernels.views` see a part of one: by a pointer to its counts that
 is null. Numba's counting of such an array is no counting, and LLVM leaves it out; and where nothing in a kernel is
 made or handed back by what may have made it, no counting is written. What a kernel returns of its arguments stays
-counted: its caller may have made it, and may keep the result alone. Nothing of this is said by a decorator, so that
-no kernel can be called by one that disagrees.
+counted: its caller may have made it, and may keep the result alone. So do all arrays of a kernel with a list, or
+whatever else arrays are put into. Nothing of this is said by a decorator, so that no kernel can be called by one that
+disagrees.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ UNKNOWN = frozenset((_MADE, _HANDED))
 _PASSING = frozenset("build_tuple cast exhaust_iter getattr getiter iternext pair_first phi typed_getitem".split())
 """Operations whose result is, or is part of, what they are given: numba counts them for its sake."""
 
+_FOLLOWED = (types.Array, types.IteratorType, types.UnicodeType)
+"""Types of values that hold what they were made of and no more: into a list, say, arrays may come later."""
+
 _PLACES = (types.Integer, types.SliceType, types.EllipsisType, types.NoneType)
 """Types of indices that see a part of an array; others make a copy."""
 
@@ -47,6 +51,11 @@ class Origins:
         self._of: dict[str, frozenset] = {}
         statements = [s for block in state.func_ir.blocks.values() for s in block.body]
         assigned = [s for s in statements if isinstance(s, ir.Assign) and self._counted(s.target.name)]
+        # what is put into something is assigned to nothing
+        followed = all(self._followed(self._typemap[s.target.name]) for s in assigned)
+        if not followed or state.func_ir.is_generator:
+            self.returned, self.makes = UNKNOWN, True
+            return
         before = None
         while before != self._of:
             # variables of loops come from each other
@@ -57,6 +66,14 @@ class Origins:
         """Origins of the result."""
         self.makes = any(_MADE in origins for origins in self._of.values())
         """Whether arrays may be in the function that only it keeps."""
+
+    def _followed(self, kind: Any) -> bool:
+        """Return whether it is known for good what a value of a type was made of."""
+        if isinstance(kind, types.BaseTuple):
+            return all(self._followed(part) for part in kind.types if self._models[part].contains_nrt_meminfo())
+        if isinstance(kind, types.Optional):
+            return self._followed(kind.type)
+        return isinstance(kind, _FOLLOWED) and not isinstance(kind, types.Generator)
 
     def _counted(self, name: str) -> bool:
         kind = self._typemap[name]

@@ -238,8 +238,8 @@ _called_by_address: set[Any] = set()
 def c_function(kernel: Any, signature: Any) -> Any:
     """Return a kernel, or a function compiled by `numba.njit`, as a C function; it is kept alive.
 
-    An exception cannot leave a C function. Kernels that are called so raise none; of other people's functions see
-    `_guarded`.
+    An exception cannot leave a C function. Kernels that are called so raise none; those of other people's functions
+    are raised by `checked`, see `_guarded`.
     """
     signature = numba_of(signature)
     with alone(getattr(kernel, "__module__", __name__)):
@@ -256,7 +256,10 @@ def c_function(kernel: Any, signature: Any) -> Any:
 
 
 def _guarded(function: Any, signature: Any) -> Callable:
-    """Return a plain function that calls another one and spoils all its numbers if it raises, so that a run fails."""
+    """Return a plain function that calls another one, and notes what that raises and spoils its numbers.
+
+    So no step is taken with them, and the compiled code soon comes to its end, behind which the exception is raised.
+    """
     names = [f"a{k}" for k in range(len(signature.args))]
     arguments = ", ".join(names)
     spoiled = "".join(
@@ -264,22 +267,43 @@ def _guarded(function: Any, signature: Any) -> Callable:
         for name, kind in zip(names, signature.args)
         if isinstance(kind, types.Array) and isinstance(kind.dtype, types.Float)
     )
-    space = {"function": function, "tell": _tell, "nan": math.nan, "name": function.py_func.__qualname__}
+    space = {"function": function, "note": _note, "nan": math.nan, "number": len(_guarded_ones)}
+    _guarded_ones.append(function)
     call = (
         f"def guarded({arguments}):\n    found = {'None' if signature.return_type == types.void else 'nan'}\n"
         f"    raised = False\n"
         f"    try:\n        {'' if signature.return_type == types.void else 'found = '}function({arguments})\n"
         f"    except Exception:\n        raised = True\n"
-        f"    if raised:\n        tell(name)\n{spoiled}    return found\n"
+        f"    if raised:\n        note(number, ({arguments},))\n{spoiled}    return found\n"
     )
     exec(call, space)
     return space["guarded"]
 
 
+class _Raised(threading.local):
+    """What functions have raised inside the compiled code that a thread runs."""
+
+    def __init__(self) -> None:
+        self.errors: list[Exception] = []
+
+
+_raised = _Raised()
+_guarded_ones: list[Any] = []
+
+
 @numba.njit
-def _tell(name):
+def _note(number, arguments):
     with numba.objmode():
-        _say(f"function {name} raised an exception; its numbers become NaN")
+        _call_again(number, arguments)
+
+
+def _call_again(number: int, arguments: tuple) -> None:
+    """Note what a function raises, of which compiled code knows no more than that it has."""
+    if not _raised.errors:
+        try:
+            _guarded_ones[number](*arguments)
+        except Exception as error:
+            _raised.errors.append(error)
 
 
 def caller(signature: Any) -> Any:
@@ -306,14 +330,16 @@ _failures: list[str] = []
 
 
 def checked(function: Callable) -> Callable:
-    """Return a compiled function that takes kernels as arguments, and that raises if a late kernel is missing.
+    """Return a compiled function that takes kernels as arguments, and that raises what C functions on the way hide.
 
-    C functions on the way hide the exception of a missing kernel.
+    That is what functions of others raise, and that a late kernel is missing.
     """
 
     @functools.wraps(function)
     def call(*args: Any, **kws: Any) -> Any:
         out = function(*(arg.compiled if isinstance(arg, Kernel) else arg for arg in args), **kws)
+        if _raised.errors:
+            raise _raised.errors.pop()
         if _failures:
             raise RuntimeError(_failures[0])
         return out

@@ -332,10 +332,10 @@ def _check_arguments(label: str, what: str, function: Any, expected: tuple[str, 
 
 def _refusals() -> tuple[type[Exception], ...]:
     """Return what is raised of a function that cannot be compiled."""
-    # of a statement that numba does not know, as an import: none of its other errors
-    from numba.core.errors import UnsupportedBytecodeError
+    import numba
 
-    return compilation_error(), UnsupportedBytecodeError, KeyError, TypeError, RuntimeError
+    # of a statement that numba does not know, as an import: none of its other errors
+    return compilation_error(), numba.UnsupportedBytecodeError, KeyError, TypeError, RuntimeError
 
 
 def _compiled(label: str, what: str, function: Any, signature: Any, expected: tuple[str, ...]) -> Any:

@@ -89,6 +89,20 @@ def give_made(n):
     return handed(made(n) + 1.0, 1)
 
 
+@njit(cache=True)
+def listed(a):
+    """Return what was put into a list."""
+    kept = [np.zeros(1)]
+    kept.append(a)
+    return kept[1]
+
+
+@njit(VECTOR(int64), cache=True)
+def give_listed(n):
+    """Return what is made here and was in a list of another kernel."""
+    return listed(made(n) + 1.0)
+
+
 @njit(types.UniTuple(VECTOR, 2)(VECTOR), cache=True)
 def give_both(a):
     """Return an argument and a part of it."""
@@ -115,7 +129,7 @@ def test_arrays_live_as_long_as_they_are_used():
         making_some(a, 2)
         making_some(a, 4)
         copied(a, a + 0.0)
-        return give(a, 2), give_made(4), give_both(a)
+        return give(a, 2), give_made(4), give_listed(4), give_both(a)
 
     run()
     runtime.memsys_enable_stats()
@@ -128,10 +142,13 @@ def test_arrays_live_as_long_as_they_are_used():
         assert runtime.memsys_get_stats_alloc() - runtime.memsys_get_stats_free() == under_way
     finally:
         runtime.memsys_disable_stats()
-    part, whole = give(3.0 * np.arange(1000.0), 990), give_made(1000)
+    part, whole, listed_one = give(3.0 * np.arange(1000.0), 990), give_made(1000), give_listed(1000)
     np.zeros(1000), np.zeros(1000)
     assert part.tolist() == [3.0 * k for k in range(990, 1000)]
     assert whole.tolist() == [1.0] * 999
+    assert listed_one.tolist() == [1.0] * 1000
+    # memory that is given back is handed out again: what holds it holds other numbers then
+    assert listed.part((VECTOR,)).origins == ("handed", "made")
 
 
 def test_what_kernels_make_none_of_is_not_counted():
