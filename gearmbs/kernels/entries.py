@@ -124,8 +124,10 @@ def _environment(functions: Any, module: str, constants: tuple, symbol: str) -> 
     """Return what compiled code takes constants from, of a symbol always the same: nobody counts its references."""
     found = _environments.get(symbol)
     if found is None:
-        found = _environments[symbol] = functions.Environment({"__name__": module})
-        found.consts[:] = constants
+        made = functions.Environment({"__name__": module})
+        made.consts[:] = constants
+        # another thread may have come first
+        found = _environments.setdefault(symbol, made)
     return found
 
 
