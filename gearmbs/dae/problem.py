@@ -273,6 +273,15 @@ class Alone(NamedTuple):
     owners: Callable[[np.ndarray], list[tuple[int, np.ndarray]] | None]
 
 
+class Home(NamedTuple):
+    """A time, unknowns there, and the tables of integers and numbers that are valid for them."""
+
+    t: float
+    y: np.ndarray
+    idata: np.ndarray
+    rdata: np.ndarray
+
+
 @dataclass
 class DAEProblem:
     """A DAE G(t, y, y') = 0 with everything an integrator needs to know about it.
@@ -355,6 +364,8 @@ class DAEProblem:
     watched : ndarray of int64
         Places in the scratch array: what a step's last evaluation of the residual leaves there is handed to a
         ``consumer`` behind the unknowns. Default: none.
+    home : Home, optional
+        Where the pivots of accelerations are chosen, wherever outputs are; default: where they are first needed.
     counted : Counted, optional
         Angles whose full turns ``hook`` counts; runs keep what is in its places at their outputs.
     """
@@ -398,8 +409,15 @@ class DAEProblem:
     callbacks: Sequence[Any] = ()
     numbers: Mapping[str, Number] = field(default_factory=dict)
     aliases: Mapping[str, str] = field(default_factory=dict)
+    home: Home | None = None
     counted: Counted | None = None
     watched: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def with_fixed_pivots(self, fixed: bool) -> DAEProblem:
+        """Return the problem with a home at its start, or with none."""
+        if not fixed:
+            return self if self.home is None else replace(self, home=None)
+        return replace(self, home=Home(self.t0, self.y0.copy(), self.idata.copy(), self.rdata.copy()))
 
     @property
     def goes_on(self) -> np.ndarray:

@@ -79,6 +79,7 @@ class Driver(Struct):
     # where the run stands
     t: float  # the present point
     present: int  # its row among the outputs
+    whole: bool  # whether pivots are chosen for all entries
     before: bool  # whether the table before the last change of coordinates is the one valid for it
     changed_at: int  # steps at whose end coordinates have changed, -1 for none
     given_at: int  # steps for which the last step has been written, -1 for none

@@ -21,13 +21,15 @@ from gearmbs.dae.linalg.plan_lists import lists_of_plan
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, factor, solve
 from gearmbs.dae.model.elastic import elastic_frames
 from gearmbs.dae.model.evaluator import evaluate_rows
+from gearmbs.dae.model.members import expand
 from gearmbs.dae.problem import ModelError
+from gearmbs.dae.results.kinetic import write_kinetic_energy
 from gearmbs.kernels.bound import FUNCTIONS_TYPE, NAMES
 from gearmbs.kernels.jit import Kernel
 from gearmbs.kernels.kinds import float64, int64
 from gearmbs.kernels.pointers import address, no_events, no_hook
 from gearmbs.mechanism.language.series import evaluate_series
-from gearmbs.mechanism.solve.simulator import Begun
+from gearmbs.mechanism.solve.told import Begun
 from gearmbs.native.afresh import AFRESH_TYPE, start_afresh
 from gearmbs.native.driver import DRIVER_TYPE, go_to
 from gearmbs.native.pivots import ROOM_TYPE, choose_for_run
@@ -90,6 +92,8 @@ class Kernels:
         self._by_name: dict[str, Any] = {
             **{kernel.__name__: kernel for kernel in BY_ADDRESS},
             "evaluate_rows": evaluate_rows,
+            "expand": expand,
+            "write_kinetic_energy": write_kinetic_energy,
             "evaluate_series": evaluate_series,
             "elastic_frames": elastic_frames,
             "residual": problem.residual,
@@ -97,6 +101,11 @@ class Kernels:
             "hook": problem.hook or no_hook,
             "events": no_events,
         }
+        if begun.by_axes:
+            # its kernels are of use to those alone who have such a model
+            from gearmbs.dae.model.fixed_axes import evaluate_axes
+
+            self._by_name["evaluate_axes"] = evaluate_axes
         own = [(kernel, None) for kernel in model.kernels.values()] + list(model.own_functions.values())
         self._own = {
             address(kernel, kernel.declared if signature is None else signature): (kernel, signature)

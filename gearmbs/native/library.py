@@ -20,7 +20,8 @@ from gearmbs.files import write_whole
 from gearmbs.kernels import PLAIN
 from gearmbs.mechanism.mechanism import Mechanism
 from gearmbs.mechanism.parts.bodies import markers_kept
-from gearmbs.mechanism.solve.simulator import Begun, Simulator
+from gearmbs.mechanism.solve.simulator import Simulator
+from gearmbs.mechanism.solve.told import Begun
 from gearmbs.native.asked import Told
 from gearmbs.native.fmu import Description, variables_of, widths_of, write_fmu
 from gearmbs.native.kernels import Kernels
@@ -180,7 +181,7 @@ def export(
     numbers = {
         name: number
         for name, number in begun.problem.numbers.items()
-        if _can_be_set(number, begun.run.state.stops.size > 0)
+        if _can_be_set(number, begun.run.state.stops.size > 0 or begun.members is not None)
     }
     kernels = Kernels(begun, any(number.prescribes for number in numbers.values()))
     m = begun.system.mechanism
@@ -255,12 +256,12 @@ def _ending(name: str, asked: dict[str, System]) -> str:
     return ending if alone or name == "linux" else f".{name}{ending}"
 
 
-def _can_be_set(number: Number, has_stops: bool) -> bool:
+def _can_be_set(number: Number, holds_motions: bool) -> bool:
     """Return whether a library takes other values of a number: not of what is a position."""
     if not number.prescribes:
         return all(place.order == 0 for place in number.places)
     orders = [order for _, order in number.prescribes]
-    return number.kind == INPUT and not has_stops and all(0 < order <= MOTION_ORDERS for order in orders)
+    return number.kind == INPUT and not holds_motions and all(0 < order <= MOTION_ORDERS for order in orders)
 
 
 def _silent(name: str) -> None:

@@ -20,17 +20,21 @@ from gearmbs.dae.linalg.entry_lists import NEGLIGIBLE, NEGLIGIBLE_IN_NEWTON
 from gearmbs.dae.linalg.left_out import signs_of_error
 from gearmbs.dae.linalg.lu_plan import NO_MODES, LUPlan, SingularMatrixError, analyse, new_lines
 from gearmbs.dae.linalg.sparse_lu import LUFactors, new_factors
-from gearmbs.dae.model.evaluator import new_records, pattern
+from gearmbs.dae.model.evaluator import Evaluator, new_records, pattern
+from gearmbs.dae.model.members import MemberEvaluator, Members
+from gearmbs.dae.model.records import Records
 from gearmbs.dae.problem import INPUT, DAEProblem, Number
+from gearmbs.dae.results.kinetic import inertias
 from gearmbs.kernels.bound import NAMES, SIGNATURES
 from gearmbs.kernels.lanes import LANES
-from gearmbs.mechanism.solve.simulator import Begun
+from gearmbs.mechanism.solve.told import Begun
 from gearmbs.native.afresh import Afresh
 from gearmbs.native.asked import Expressions, Told, expressions_of
 from gearmbs.native.driver import Driver
 from gearmbs.native.image import CONSTANT, SCRATCH, STATE, Image, Layout, member_of, word_of
 from gearmbs.native.kernels import BY_ADDRESS
 from gearmbs.native.pivots import PlanRoom
+from gearmbs.native.series import ENERGY
 from gearmbs.native.teller import Teller
 
 ROWS = 2
@@ -141,6 +145,7 @@ def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], fun
         image.function_at(parts["driver"], member_of(Driver, kernel.__name__), function(kernel.__name__))
     asked = expressions_of(begun.system, told)
     teller, plan, indptr, indices = _teller(begun, told, asked)
+    by_axes, lumped = begun.by_axes, begun.members is not None
     ones, counted = np.ones(indptr.size - 1), np.zeros(indices.size)
     found = _factored(image, plan, new_factors(plan), indptr, indices, ones, counted, [], False, None, None)
     kinds = {**dict.fromkeys(_RECORDS, SCRATCH), **dict.fromkeys(_ASKED, CONSTANT)}
@@ -148,7 +153,15 @@ def memory_of(begun: Begun, numbers: Mapping[str, Number], told: list[Told], fun
         # of the point before nothing is asked
         kinds |= dict.fromkeys(_OF_POINTS, SCRATCH)
     parts["teller"] = image.struct(teller, STATE, kinds)
-    image.function_at(parts["teller"], member_of(Teller, "evaluate"), function("evaluate_rows"))
+    of_teller = {
+        "evaluate": "" if by_axes else "evaluate_rows",
+        "axes": "evaluate_axes" if by_axes else "",
+        "expand": "expand" if lumped and not by_axes else "",
+        "kinetic": "write_kinetic_energy" if teller.bodies.size else "",
+    }
+    for name, kernel in of_teller.items():
+        if kernel:
+            image.function_at(parts["teller"], member_of(Teller, name), function(kernel))
     if asked.bounds.size:
         for name, kernel in (("series", "evaluate_series"), ("elastic_frames", "elastic_frames")):
             image.function_at(parts["teller"], member_of(Teller, name), function(kernel))
@@ -367,10 +380,19 @@ _RECORDS = (
     "rdata",
     "grad",
     "tape_work",
+    "energy",
+    "own_pose",
+    "own_solution",
+    "own_phi",
+    "own_strayed",
+    "own_loads",
+    "own_force",
+    "own_moment",
 )
 _ASKED = (
     "slots", "turns", "first", "kind", "at", "ints", "floats", "bounds", "own_first", "own_kind", "own_at",
-    "marker_body", "marker_frame", "elastic", "shapes", "counts", "further",
+    "marker_body", "marker_frame", "elastic", "shapes", "counts", "further", "home", "bodies", "modal", "integrals",
+    "group", "place", "of_marker", "row", "edge", "turn",
 )  # fmt: skip
 _OF_POINTS = ("kin", "acc", "tape_y")
 
@@ -401,6 +423,7 @@ def _driver(begun: Begun, numbers: Mapping[str, Number]) -> Driver:
         watch_steps=int(st.steps),
         watch_t=float(st.t),
         repivots=run.repivots,
+        whole=run.options.fixed_pivots,
         jump_y=np.zeros(n),
         jump_yp=np.zeros(n),
         table=records.table.copy(),
@@ -425,7 +448,7 @@ def _driver(begun: Begun, numbers: Mapping[str, Number]) -> Driver:
 def _teller(begun: Begun, told: list[Told], asked: Expressions) -> tuple[Teller, LUPlan, np.ndarray, np.ndarray]:
     """Return what tells outputs, a plan for its matrix, and the pattern of that."""
     problem, model = begun.problem, begun.system.model
-    indptr, indices, slots = pattern(problem.idata, problem.rdata, problem.work_size, problem.t0, problem.y0)
+    indptr, indices, slots = _pattern(begun)
     names, modes = model.names, sum(model.modes)
     most = max((len(d) for d in model.diagnostics), default=0)
     records = new_records(1, len(names.bodies), len(names.rows), len(names.forces), most, modes)
@@ -472,5 +495,49 @@ def _teller(begun: Begun, told: list[Told], asked: Expressions) -> tuple[Teller,
         known=np.full(2 * asked.starts.size, np.nan),
         grad=np.zeros(max(1, asked.gradient)),
         tape_work=np.zeros(asked.work),
+        home=np.zeros(0) if problem.home is None or begun.by_axes else _evaluator(begun).matrix_at_home(),
+        energy=np.zeros(1),
+        **_inertias(begun, told),
+        **_members(begun, records),
     )
     return teller, plan, indptr, indices
+
+
+def _pattern(begun: Begun) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (indptr, indices, slots) of the matrix of accelerations; where there is none, of one of a single entry."""
+    problem = begun.problem
+    if begun.by_axes:
+        return np.array([0, 1]), np.array([0]), np.zeros(1, dtype=np.int64)
+    return pattern(problem.idata, problem.rdata, problem.work_size, problem.t0, problem.y0)
+
+
+def _evaluator(begun: Begun) -> Evaluator:
+    """Return what Python evaluates outputs with."""
+    if begun.members is None:
+        return Evaluator(begun.problem)
+    return MemberEvaluator(begun.problem, begun.members)
+
+
+def _inertias(begun: Begun, told: list[Told]) -> dict[str, np.ndarray]:
+    """Return what the kinetic energy is found with, if an output tells it."""
+    if any(kind == ENERGY for one in told for kind, _ in one.places):
+        return inertias(begun.system.model)._asdict()
+    return {"bodies": np.zeros((0, 0)), "modal": np.zeros(0, dtype=np.int64), "integrals": np.zeros(0)}
+
+
+def _members(begun: Begun, whole: Records) -> dict[str, np.ndarray]:
+    """Return what bodies that are integrated as one are made of, and room for records of these."""
+    members, tables = begun.members, begun.problem.idata
+    if members is None or begun.by_axes:
+        own = new_records(1, 0, 0, 0, 0)
+    else:
+        own = new_records(
+            1, int(tables[T.H_BODIES]) - 1, int(tables[T.H_ROWS]), int(tables[T.H_FORCES]), int(tables[T.H_DIAGNOSTICS])
+        )
+        assert own.loads.shape == whole.loads.shape
+    made = {f"own_{name}": part for name, part in own._asdict().items()}
+    made |= {f"own_{name}": made[f"own_{name}"].ravel() for name in ("loads", "force", "moment")}
+    if members is None:
+        nothing = np.zeros(0, dtype=np.int64)
+        return made | dict.fromkeys(Members._fields, nothing) | {"place": np.zeros(0)}
+    return made | {name: np.ascontiguousarray(part).ravel() for name, part in members._asdict().items()}

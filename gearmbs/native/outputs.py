@@ -24,10 +24,10 @@ from gearmbs.mechanism.parts.inputs import Output
 from gearmbs.mechanism.parts.joints import kinds_with_angle, kinds_with_displacement
 from gearmbs.mechanism.parts.modal import ModalBody
 from gearmbs.mechanism.solve.carriers import error_tape, own_marker, pair_of, unturned
-from gearmbs.mechanism.solve.simulator import Begun, Simulator
-from gearmbs.mechanism.solve.told import PAIRED, VECTORIAL
+from gearmbs.mechanism.solve.simulator import Simulator
+from gearmbs.mechanism.solve.told import PAIRED, VECTORIAL, Begun
 from gearmbs.native.asked import Counted, Told
-from gearmbs.native.series import FORCE, LOADS, MOMENT, NUMBER, POSE, SOLUTION, STRAYED, UNKNOWN
+from gearmbs.native.series import ENERGY, FORCE, LOADS, MOMENT, NUMBER, POSE, SOLUTION, STRAYED, UNKNOWN
 from gearmbs.wording import did_you_mean
 
 AXES = ("x", "y", "z")
@@ -54,7 +54,7 @@ ERROR = "transmission_error"
 DEFLECTION = "deflection"
 EVALUATE = "evaluate"
 OTHERS = ("orientation", "reaction", "reaction_force", "load", "diagnostics", "contact", DEFLECTION, ERROR, "state",
-          "unknown", "constraint_violation")  # fmt: skip
+          "unknown", "multipliers", "constraint_violation", "kinetic_energy")  # fmt: skip
 ALL = "all"
 """Stands for every output: those of the mechanism, and what is told of one that has none."""
 
@@ -105,6 +105,8 @@ class Finder:
                 return Told(name, unit, ((record, place + _component(AXES, component)),))
             if what == "orientation":
                 body, row, column = rest
+                if not (str(row) in "012" and str(column) in "012"):
+                    raise ValueError(f"there is no element {row}, {column}; rows and columns are 0, 1 and 2")
                 place = self._index(self.model.names.bodies, body, "body") * POSE_COLUMNS + POSE_A
                 return Told(name, "1", ((POSE, place + 3 * int(row) + int(column)),))
             if what == "reaction":
@@ -144,8 +146,15 @@ class Finder:
             if what == "unknown":
                 (unknown,) = rest
                 return Told(name, "1", ((UNKNOWN, self._index(self.problem.names, unknown, "unknown")),))
+            if what == "multipliers":
+                (row,) = rest
+                rows = self.model.names.rows
+                place = 6 * len(self.model.names.bodies) + sum(self.model.modes) + self._index(rows, row, "row")
+                return Told(name, "1", ((SOLUTION, place),))
             if what == "constraint_violation" and not rest:
                 return Told(name, "1", ((STRAYED, 0),))
+            if what == "kinetic_energy" and not rest:
+                return Told(name, "J", ((ENERGY, 0),))
         except (ValueError, TypeError) as error:
             raise ModelError(f"output {name!r}: {tuple(asked)!r} cannot be told: {error}") from None
         known = ", ".join([*OF_BODY, *MODAL, *OF_JOINT, *OF_MARKER, *OTHERS])
@@ -314,7 +323,35 @@ class Finder:
         for joint in self.model.rows_of_joint:
             asked += [("reaction", joint, component) for component in WRENCH]
         asked += [("state", state) for state in self.states]
-        return {f"{of}.{'.'.join((what, *rest))}": (what, of, *rest) for what, of, *rest in asked}
+        found: dict[str, tuple[Any, ...]] = {
+            f"{of}.{'.'.join((what, *rest))}": (what, of, *rest) for what, of, *rest in asked
+        }
+        return found | {"kinetic_energy": ("kinetic_energy",)}
+
+    def further_names(self) -> dict[str, tuple[Any, ...]]:
+        """Return the names of what is told where it is asked for, with what `find` takes, as `names` does."""
+        m = self.mechanism
+        asked: list[tuple[str, ...]] = []
+        for body in self.model.names.bodies:
+            asked += [("orientation", body, row, column) for row in "012" for column in "012"]
+        for name, joint in m.joints.items():
+            if joint.kind in kinds_with_angle():
+                asked.append(("joint_angle", name))
+            if joint.kind in kinds_with_displacement():
+                asked.append(("joint_displacement", name))
+            if joint.kind in (*kinds_with_angle(), *kinds_with_displacement()):
+                asked.append(("joint_rate", name))
+            asked += [("reaction_force", name, axis) for axis in AXES if name in self.model.rows_of_joint]
+        for one in (one for body in (m.ground, *m.bodies.values()) for one in body.markers):
+            asked += [(what, one.name, axis) for what in OF_MARKER for axis in AXES]
+            if isinstance(one.body, ModalBody):
+                asked += [(DEFLECTION, one.name, component) for component in WRENCH]
+        asked += [("unknown", unknown) for unknown in self.problem.names]
+        asked += [("multipliers", row) for row in self.model.names.rows]
+        found: dict[str, tuple[Any, ...]] = {
+            f"{of}.{'.'.join((what, *rest))}": (what, of, *rest) for what, of, *rest in asked
+        }
+        return found | {"constraint_violation": ("constraint_violation",)}
 
     def parts(self, output: Output) -> list[tuple[str, tuple[Any, ...]]]:
         """Return the names of the numbers that an output of the mechanism is, and what `find` takes for each."""
@@ -326,10 +363,15 @@ class Finder:
                 components = WRENCH
             elif what in VECTORIAL:
                 components = AXES
+            elif what == "orientation":
+                elements = [(row, column) for row in range(3) for column in range(3)]
+                return [(f"{output.name}.{row}.{column}", (what, *rest, row, column)) for row, column in elements]
             elif what in MODAL and rest[0] in self.model.names.bodies:
                 components = range(self.model.modes[self.model.names.bodies.index(rest[0]) + 1])
             elif what in ("diagnostics", "contact") and rest[0] in self.model.names.forces:
                 components = [d.name for d in self.model.diagnostics[self.model.names.forces.index(rest[0])]]
+        elif what == "multipliers" and not rest:
+            components = self.model.names.rows
         if not components:
             return [(output.name, output.what)]
         return [(f"{output.name}.{one}", (what, *rest, one)) for one in components]
@@ -417,6 +459,9 @@ def _asked(finder: Finder, named: Any, names: Any, item: Any) -> list[tuple[str,
         return [(item, names[item])]
     if "(" in item:
         return [(item, (EVALUATE, item))]
-    known = [*named, *names]
+    further = finder.further_names()
+    if item in further:
+        return [(item, further[item])]
+    known = [*named, *names, *further]
     meant = did_you_mean(item, known, shown=repr, otherwise=f"the outputs are {', '.join(named) or ', '.join(names)}")
     raise ModelError(f"output {item!r}: there is none of this name; {meant}")

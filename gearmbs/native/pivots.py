@@ -342,7 +342,7 @@ def choose_for_run(st, d, room, columns, rows_left, plan, factors):
             negligible = NEGLIGIBLE_IN_NEWTON[stricter]
         d.repivots += 1
         drop = DROP_TOLERANCES[st.drop_level]
-        fewest = st.drop_level > 0 or st.matrix.shape[0] < FEWEST_ENTRIES
+        fewest = d.whole or st.drop_level > 0 or st.matrix.shape[0] < FEWEST_ENTRIES
         leaves = not (fewest or d.repivots > LEAVING_PLANS + st.steps // STEPS_A_PLAN)
         # what counts in one matrix does not in all that follow
         rank = write_plan(d, room, columns, rows_left, st.matrix, drop, leaves, stricter == 0, negligible)

@@ -20,7 +20,7 @@ from gearmbs.native.setting import value_of
 elastic_frames_at = caller(elastic_frames.declared)
 series_at = caller(evaluate_series.declared)
 
-UNKNOWN, POSE, SOLUTION, LOADS, FORCE, MOMENT, NUMBER, STRAYED = range(8)
+UNKNOWN, POSE, SOLUTION, LOADS, FORCE, MOMENT, NUMBER, STRAYED, ENERGY = range(9)
 """Where a number of an output stands: among the unknowns, in which of the records, among what can be set."""
 REQUEST = 7
 """Numbers that say where an expression stands: its output, where its tables of integers and of numbers begin, its
@@ -49,6 +49,8 @@ def number_of(st, d, q, kind, at):
         return q.moment[at]
     if kind == STRAYED:
         return q.strayed[at]
+    if kind == ENERGY:
+        return q.energy[at]
     return value_of(d, d.held, at)
 
 

@@ -40,6 +40,8 @@ def pair(tmp_path_factory):
 
 def expected(m, sim, name):
     """Return an output by its name in a library as a simulator tells it."""
+    if name == "kinetic_energy":
+        return sim.get(name)
     owners = {*m.bodies, *m.elements, *m.joints, *m.state_names}
     for owner in sorted(owners, key=len, reverse=True):
         if name.startswith(f"{owner}."):

@@ -92,6 +92,7 @@ class Run:
         self.algebraic = AlgebraicOutputs(problem, problem.atol_scale * options.tol, options.rtol, (problem.t0, end))
         self.state = initial_state(problem, options, outputs, end, every_step or options.dense_output)
         self.state.constrained = self.algebraic.is_constrained
+        self.state.left_out &= not options.fixed_pivots
         self.records = Records(problem, self.state, options, every_step, self.algebraic)
         choose_steps(self)
         self.stall = StallWatch(self.state.steps, self.state.t)
@@ -173,7 +174,8 @@ class Run:
         """Return which entries of the matrix have counted so far, if the others may be left out of a plan."""
         st = self.state
         plans = LEAVING_PLANS + st.steps // STEPS_A_PLAN
-        if st.drop_level > 0 or len(self.counted) < FEWEST_ENTRIES or self.repivots > plans:
+        few = len(self.counted) < FEWEST_ENTRIES
+        if self.options.fixed_pivots or st.drop_level > 0 or few or self.repivots > plans:
             return None
         return self.counted
 

@@ -99,6 +99,11 @@ class Options:
         another run can start, as ``result.kept``. Default: none is kept. Steps do not depend on it.
     errors : list of BaseException, optional
         Where callbacks in Python leave the exceptions they raise.
+    fixed_pivots : bool
+        Whether pivots follow from the matrix that they are chosen for alone, with all of its entries, and not from
+        which entries have counted in matrices before as well; and those of outputs of mechanisms from the start of the
+        model, so that it makes no difference where one has looked before. Default False: entries that have not counted
+        so far are left out, which is faster.
     history : History, optional
         Of the `gearmbs.dae.State` that the problem starts in: the run goes on with it, by the same method, instead of
         starting afresh.
@@ -133,6 +138,7 @@ class Options:
     pause: Pause | None = None
     keep_at: float = math.inf
     errors: list[BaseException] | None = None
+    fixed_pivots: bool = False
     history: History | None = None
 
     def __post_init__(self) -> None:
@@ -145,6 +151,8 @@ class Options:
         if self.max_order is not None and not 1 <= self.max_order <= self.highest_order:
             kind = "" if self.integrator.compiled else f" for {self.method}"
             raise ValueError(f"max_order (KMAX) must be 1 to {self.highest_order}{kind}, is {self.max_order!r}")
+        if not isinstance(self.fixed_pivots, bool | np.bool_):
+            raise ValueError(f"fixed_pivots is {self.fixed_pivots!r}; give True or False")
         if isinstance(self.breakpoints, str) or not isinstance(self.breakpoints, Iterable):
             raise ValueError(f"breakpoints is {self.breakpoints!r}; give a list of times")
         for b in self.breakpoints:
@@ -260,6 +268,7 @@ class StepKeywords(TypedDict, total=False):
     repairs: float
     pause: Pause | None
     keep_at: float
+    fixed_pivots: bool
 
 
 class OptionKeywords(StepKeywords, total=False):

@@ -55,6 +55,8 @@ _IVEC = int64[::1]
 GENERIC_TURNS = (0.1, 0.02, 0.3, 0.0)
 """Rotations, rad, off the position at which pivots are chosen, tried in turn: at special positions entries vanish by
 accident and the pivots would not serve their neighbours."""
+FIXED_TURNS = (0.0, *GENERIC_TURNS)
+"""The same where pivots are those of one row alone: they are chosen for its very matrix first."""
 
 SINGULAR = 1e-8
 """Relative singular value of the index-1 matrix below which a direction counts as undetermined."""
@@ -400,10 +402,14 @@ class Assembler:
 class Evaluator:
     """Fills records piece by piece: what is found for one piece (pattern, pivots, counted turns) serves the next.
 
-    Pieces are to be handed over in the order of time.
+    Pieces are to be handed over in the order of time. Of a problem with a `home` each row is evaluated by itself, with
+    the pivots that are chosen there, or if they do not serve with some of its own: neither pieces nor rows that were
+    looked at before make a difference then, to the last digit.
     """
 
     def __init__(self, problem: DAEProblem) -> None:
+        self.home = problem.home
+        self._at_home: tuple[LUPlan | None, LUFactors | None, float] | None = None
         self.pattern = pattern(problem.idata, problem.rdata, problem.work_size, problem.t0, problem.y0)
         self.rdata = problem.rdata.copy()
         self.work = np.zeros(problem.work_size)
@@ -425,16 +431,23 @@ class Evaluator:
             table = np.ascontiguousarray(table)
             attempt = 0
             while first < last:
-                if self.plan is None or attempt > 0:
+                if self.home is not None and self.plan is None and attempt == 0:
+                    self._go_home()
+                elif self.plan is None or attempt > 0:
                     place = t[first : first + 1], y[first : first + 1]
-                    if attempt > len(GENERIC_TURNS):
+                    turns = GENERIC_TURNS if self.home is None else FIXED_TURNS
+                    if attempt > len(turns):
                         self._evaluate_singular(first, *place, table, records)
                         first, attempt, self.plan = first + 1, 0, None
                         continue
-                    if attempt > 1 or not self._choose_sparsely(*place, table):
-                        self._choose_pivots(*place, table, GENERIC_TURNS[max(attempt, 1) - 1])
-                done = self._evaluate_rows(first, last, t, y, table, records)
-                attempt = attempt + 1 if done == first else 1 if done < last else 0
+                    if attempt > 1 or self.home is not None or not self._choose_sparsely(*place, table):
+                        self._choose_pivots(*place, table, turns[max(attempt, 1) - 1])
+                stop = last if self.home is None else first + 1
+                done = self._evaluate_rows(first, stop, t, y, table, records)
+                if self.home is not None and attempt > 0 and done > first:
+                    # these pivots were those of this row
+                    self.plan = None
+                attempt = attempt + 1 if done == first else 1 if done < stop else 0
                 first = done
 
     def _evaluate_rows(self, first: int, last: int, t: np.ndarray, y: np.ndarray, table: np.ndarray, records) -> int:
@@ -461,19 +474,38 @@ class Evaluator:
         self, t: np.ndarray, y: np.ndarray, table: np.ndarray, turn: float, counted: np.ndarray | None = None
     ) -> None:
         """Choose pivots near one row, every angle turned off it so that no entry is zero by accident."""
-        indptr, indices, slots = self.pattern
         self.vals[:] = 0.0
-        assemble(t, _turned(y, table, turn), slots, table, self.rdata, self.work.size, self.vals)
+        assemble(t, _turned(y, table, turn), self.pattern[2], table, self.rdata, self.work.size, self.vals)
+        self._choose(self.vals, float(t[0]), counted)
+
+    def _go_home(self) -> None:
+        """Take the pivots of all outputs."""
+        if self._at_home is None:
+            self._choose(self.matrix_at_home())
+            self._at_home = self.plan, self.factors, self.growth
+        self.plan, self.factors, self.growth = self._at_home
+
+    def matrix_at_home(self) -> np.ndarray:
+        """Return the values of the matrix that the pivots of all outputs are chosen for."""
+        assert self.home is not None
+        t, y, table, rdata = self.home
+        vals = np.zeros(self.vals.size)
+        assemble(np.array([t]), y[None, :], self.pattern[2], table, rdata.copy(), self.work.size, vals)
+        return vals
+
+    def _choose(self, vals: np.ndarray, t: float = 0.0, counted: np.ndarray | None = None) -> None:
+        """Choose pivots for values of the matrix at a time."""
+        indptr, indices, _ = self.pattern
         try:
-            self.plan = analyse(indptr, indices, self.vals, np.ones(indptr.size - 1), counted=counted, with_tail=False)
+            self.plan = analyse(indptr, indices, vals, np.ones(indptr.size - 1), counted=counted, with_tail=False)
         except SingularMatrixError as error:
             raise ModelError(
-                f"the equations are singular to rounding at t = {t[0]:.6g} s: look for masses and moments of inertia "
+                f"the equations are singular to rounding at t = {t:.6g} s: look for masses and moments of inertia "
                 "that differ by too many orders of magnitude"
             ) from error
         self.factors = new_factors(self.plan)
         # an ill-scaled mechanism may grow with the best of pivots
-        self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, self.vals))
+        self.growth = max(GROWTH_LIMIT, 100.0 * factor(self.plan, self.factors, vals))
 
 
 def _least_squares_row(k: int, t, y, matrix_pattern, idata, rdata, work_size, records: Records) -> None:

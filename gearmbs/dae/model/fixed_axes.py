@@ -42,7 +42,7 @@ from gearmbs.dae.equations.loads.forces import (
 from gearmbs.dae.equations.rotation import KIN_R, KIN_W, POSE_A, POSE_R, POSE_V, POSE_W
 from gearmbs.dae.equations.unknowns import SI2
 from gearmbs.dae.model.members import (
-    MEMBERS_TYPE,
+    AXES_SIG,
     TURN_I,
     TURN_J,
     TURN_ROOT,
@@ -53,11 +53,11 @@ from gearmbs.dae.model.members import (
     internal_reactions,
     move_member,
 )
-from gearmbs.dae.model.records import RECORDS_TYPE, Records
+from gearmbs.dae.model.records import Records
 from gearmbs.dae.model.system import counted_angles, turns_of_one
 from gearmbs.dae.problem import DAEProblem
 from gearmbs.kernels.jit import njit
-from gearmbs.kernels.kinds import float64, int64, void
+from gearmbs.kernels.kinds import float64, int64
 from gearmbs.kernels.pointers import address
 from gearmbs.kernels.structs import matrix_at, uncounted, vector_at
 
@@ -518,12 +518,7 @@ def _evaluate(first, last, t, y, idata, rdata, work, members, records, own, turn
         records.strayed[k] = 0.0
 
 
-@njit(
-    void(int64, int64, _VEC, _MAT, _IVEC, _VEC, _VEC, MEMBERS_TYPE, RECORDS_TYPE),
-    cache=True,
-    error_model="numpy",
-    nogil=True,
-)
+@njit(AXES_SIG, cache=True, error_model="numpy", nogil=True)
 def evaluate_axes(first, last, t, y, idata, rdata, work, members, records):
     """Evaluate output rows ``first`` to ``last - 1``.
 

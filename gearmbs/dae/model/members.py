@@ -86,6 +86,9 @@ class Members(NamedTuple):
 
 MEMBERS_TYPE = types.NamedTuple((_IVEC, float64[:, ::1], _IVEC, _IVEC, int64[:, ::1], int64[:, ::1]), Members)
 
+AXES_SIG = void(int64, int64, _VEC, float64[:, ::1], _IVEC, _VEC, _VEC, MEMBERS_TYPE, RECORDS_TYPE)
+"""Signature of `gearmbs.dae.model.fixed_axes.evaluate_axes`, whose module those load who call it."""
+
 
 def no_turns() -> np.ndarray:
     """Return the table of axes of groups that are integrated by all six coordinates."""

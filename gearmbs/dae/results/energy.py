@@ -15,8 +15,9 @@ import xarray as xr
 
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED
-from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W, POSE_A, POSE_V, POSE_W
+from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
 from gearmbs.dae.results.frames import Evaluated, frame_motion
+from gearmbs.dae.results.kinetic import kinetic_energy as energy_of_poses
 from gearmbs.wording import warn
 
 if TYPE_CHECKING:
@@ -183,17 +184,7 @@ def _over_modal_bodies(
 
 def kinetic_energy(found: Evaluated) -> np.ndarray:
     """Return the kinetic energy over time, shape (m,), J."""
-    total = np.zeros(found.t.size)
-    poses = found.records.by_body
-    for b, (row, modal) in enumerate(zip(found.model.bodies[1:], found.model.modal_inertia[1:])):
-        v, w = poses[:, b, POSE_V : POSE_V + 3], poses[:, b, POSE_W : POSE_W + 3]
-        local = np.einsum("tji,tj->ti", poses[:, b, POSE_A : POSE_A + 9].reshape(-1, 3, 3), w)
-        total += 0.5 * row[T.BODY_MASS] * np.sum(v * v, axis=1)
-        total += 0.5 * np.einsum("ti,ij,tj->t", local, row[T.BODY_INERTIA :].reshape(3, 3), local)
-        if modal is not None:
-            q_f, v_f, _ = found.modal(b + 1)
-            total += modal.kinetic_energy(local, q_f, v_f)
-    return total
+    return energy_of_poses(found.records.pose, found.model)
 
 
 def _gravity(found: Evaluated) -> np.ndarray:

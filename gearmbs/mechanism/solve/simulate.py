@@ -286,6 +286,7 @@ def simulate(
         )
     else:
         system, problem, members, lumping = _taken_over(assembled, mechanism, set_up, t_model)
+    problem = problem.with_fixed_pivots(settings.get("fixed_pivots", False))
     if initial is not None:
         # events in what is left of the last step would be missed
         problem = _from_state(

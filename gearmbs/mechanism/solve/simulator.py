@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from time import perf_counter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.stepping.held_run import HeldRun
 from gearmbs.dae.methods import DEFAULT, INTEGRATORS, those_that
 from gearmbs.dae.model.system import settle_states
-from gearmbs.dae.problem import DAEProblem, ModelError, Number
+from gearmbs.dae.problem import ModelError, Number
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import CONFLICT_SAMPLES, Solution
 from gearmbs.dae.state import State
@@ -42,7 +42,7 @@ from gearmbs.mechanism.solve.simulate import (
     with_brief_changes,
     with_stops,
 )
-from gearmbs.mechanism.solve.told import Point
+from gearmbs.mechanism.solve.told import Begun, Point
 from gearmbs.units import QuantityLike
 from gearmbs.wording import any_of
 
@@ -57,16 +57,6 @@ OWN = {
 """Its name, and its settings beside the options of integrators."""
 REFUSED = ("dense_output", "consumer", "slopes", "event_direction", "event_action", "event_count", "history")
 """Options of integrators that are about outputs and events of a run that is told its end."""
-
-
-class Begun(NamedTuple):
-    """What stands behind a simulation: its run, the present point, the model, its equations, what is set in them."""
-
-    run: HeldRun
-    point: Point
-    system: Any
-    problem: DAEProblem
-    cells: np.ndarray
 
 
 class Simulator(Sampled, Restored, Guessed):
@@ -170,6 +160,7 @@ class Simulator(Sampled, Restored, Guessed):
         self._system, self._base, self._members, self._remark = prepared(
             mechanism, t_model, lump, formulation, rate_scale, initial is not None
         )
+        self._base = self._base.with_fixed_pivots(settings.get("fixed_pivots", False))
         self._base.advice = {**ADVICE, **(advice or {})}
         settings |= with_brief_changes(self._system, t_model, self.t_end, settings)
         self._functions = list(mechanism.functions.values())
@@ -437,7 +428,6 @@ class Simulator(Sampled, Restored, Guessed):
             *(["controllers"] if self._controls else []),
             *(["stops"] if self._stops else []),
             *(["inputs on their way"] if self._settings.on_the_way(self.t) is not None else []),
-            *(["bodies that have been lumped (make it with lump=False)"] if self._members is not None else []),
         ]
         if held:
             raise ModelError(f"simulator: it cannot go on without Python: it has {', '.join(held)}")
@@ -447,7 +437,7 @@ class Simulator(Sampled, Restored, Guessed):
             self._failed = failure[1]
         if self._failed is not None:
             raise ModelError(f"the simulation has failed: {self._failed}")
-        return Begun(self._run, self._point, self._system, self._base, self._settings.cells)
+        return Begun(self._run, self._point, self._system, self._base, self._settings.cells, self._members)
 
     # --- acting on it ---------------------------------------------------------------------------------
 

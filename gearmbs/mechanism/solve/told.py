@@ -6,12 +6,12 @@ import re
 from bisect import bisect_right
 from inspect import Signature, signature
 from operator import itemgetter
-from typing import Any, Literal, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import numpy as np
 
 from gearmbs.dae.integrators.stepping.held_run import HeldRun, Rows
-from gearmbs.dae.problem import ModelError, cells_of
+from gearmbs.dae.problem import DAEProblem, ModelError, cells_of
 from gearmbs.dae.result import DAEResult, Status
 from gearmbs.dae.results.solution import Solution
 from gearmbs.dae.state import State
@@ -20,6 +20,9 @@ from gearmbs.mechanism.parts.inputs import AXES as VECTORS
 from gearmbs.mechanism.parts.inputs import WRENCHES, Output
 from gearmbs.mechanism.solve.settings import Settings
 from gearmbs.wording import any_of, did_you_mean
+
+if TYPE_CHECKING:
+    from gearmbs.dae.model.members import Members
 
 AT_AN_INSTANT = (
     "com_position", "orientation", "com_velocity", "angular_velocity", "com_acceleration", "angular_acceleration",
@@ -60,6 +63,25 @@ class Point(NamedTuple):
     def yp(self) -> np.ndarray:
         """Their rates."""
         return self.rows.yp[self.row]
+
+
+class Begun(NamedTuple):
+    """What stands behind a simulation: its run, the present point, the model, its equations, what is set in them.
+
+    Of bodies that are integrated as one ``members`` tells how those of the model follow.
+    """
+
+    run: HeldRun
+    point: Point
+    system: Any
+    problem: DAEProblem
+    cells: np.ndarray
+    members: Members | None
+
+    @property
+    def by_axes(self) -> bool:
+        """Whether angles about fixed axes alone are integrated."""
+        return self.members is not None and len(self.members.turn) > 0
 
 
 Number = Literal[
