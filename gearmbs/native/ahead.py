@@ -14,13 +14,17 @@ from typing import Any
 
 from gearmbs.contact.kernel import GEAR_CONTACT_SIG
 from gearmbs.dae.equations import expressions
+from gearmbs.dae.equations.fixed_axes import axes_hook, axes_jacobian, axes_residual
 from gearmbs.dae.equations.jacobian import jacobian
 from gearmbs.dae.equations.kinematics import hook
 from gearmbs.dae.equations.loads.expressions import KERNELS
-from gearmbs.dae.equations.loads.forces import FORCE_SIG
+from gearmbs.dae.equations.loads.forces import FORCE_SIG, TURNING_SIG
 from gearmbs.dae.equations.residual import residual
 from gearmbs.dae.model.elastic import elastic_frames
 from gearmbs.dae.model.evaluator import evaluate_rows
+from gearmbs.dae.model.fixed_axes import evaluate_axes
+from gearmbs.dae.model.members import expand
+from gearmbs.dae.results.kinetic import write_kinetic_energy
 from gearmbs.drivetrain.torque_element import LAW_SIG
 from gearmbs.kernels import cache
 from gearmbs.kernels.ahead import Report
@@ -32,7 +36,8 @@ from gearmbs.native.kernels import BY_ADDRESS, CALLED, OF_MOTIONS
 from gearmbs.system import cores
 
 OF_EQUATIONS = (
-    residual, jacobian, hook, no_hook, no_events, evaluate_rows, evaluate_series, elastic_frames,
+    residual, jacobian, hook, no_hook, no_events, evaluate_rows, evaluate_series, elastic_frames, write_kinetic_energy,
+    axes_residual, axes_jacobian, axes_hook, evaluate_axes, expand,
     *(getattr(expressions, name) for name in KERNELS),
 )  # fmt: skip
 """Kernels of the equations and of what is told, which are in tables, or stand behind the driver by name."""
@@ -43,7 +48,7 @@ def exportable() -> dict[str, tuple[Any, Any]]:
     """Return kernels and signatures, None where they are declared, of all that an exported model may be made of."""
     import_all()
     known = kernels(kernel_modules())
-    held = {_types(signature) for signature in (FORCE_SIG, LAW_SIG, GEAR_CONTACT_SIG)}
+    held = {_types(signature) for signature in (FORCE_SIG, TURNING_SIG, LAW_SIG, GEAR_CONTACT_SIG)}
     by_address = [k for k in entries(known) if k.declared_types() in held]
     plain = [*BY_ADDRESS, *OF_EQUATIONS, *by_address, *(k for k in known if k.late)]
     called = [*CALLED.values(), *OF_MOTIONS.values()]

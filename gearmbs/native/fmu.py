@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
+from gearmbs.dae.problem import ANY, Allowed, Number
 from gearmbs.files import whole_file
 from gearmbs.native.asked import Told
 from gearmbs.units import powers_of
@@ -44,6 +46,8 @@ class Variable(NamedTuple):
         None of outputs.
     size : int, optional
         Of an array how many numbers it has; 0 for a scalar.
+    allowed : Allowed, optional
+        What it can be set to.
     """
 
     name: str
@@ -51,6 +55,7 @@ class Variable(NamedTuple):
     causality: str
     start: float | None
     size: int = 0
+    allowed: Allowed = ANY
 
 
 class Description(NamedTuple):
@@ -76,13 +81,15 @@ class Description(NamedTuple):
 
 
 def variables_of(
-    numbers: Mapping[str, tuple[str, str, float]], told: Sequence[Told], arrays: bool = False
+    numbers: Mapping[str, tuple[str, str, float, Allowed]], told: Sequence[Told], arrays: bool = False
 ) -> list[Variable]:
-    """Return the variables of a model: numbers by name with kind, unit and present value, then outputs.
+    """Return the variables of a model: numbers by name with kind, unit, present value and range, then outputs.
 
     With ``arrays`` components of a vector that follow each other are one output.
     """
-    found = [Variable(name, unit, kind, value) for name, (kind, unit, value) in numbers.items()]
+    found = [
+        Variable(name, unit, kind, value, allowed=allowed) for name, (kind, unit, value, allowed) in numbers.items()
+    ]
     outputs = [Variable(one.name, one.unit, "output", None) for one in told]
     k = 0
     while k < len(outputs):
@@ -104,6 +111,14 @@ def _vector(outputs: Sequence[Variable], k: int) -> Variable | None:
         while k + size < len(outputs) and outputs[k + size][:2] == (f"{of}.{size}", unit):
             size += 1
     return outputs[k]._replace(name=of, size=size) if size > 1 else None
+
+
+def range_of(number: Number) -> tuple[float, float]:
+    """Return the least and the largest value that a number can be set to."""
+    allowed = number.allowed
+    # the next one above a bound that is left out
+    least = math.nextafter(allowed.least, math.inf) if allowed.above else allowed.least
+    return float(least), float(allowed.most)
 
 
 def widths_of(variables: Sequence[Variable]) -> list[int]:
@@ -172,6 +187,8 @@ def model_description(told: Description, version: str) -> bytes:
             attributes["initial"] = "calculated"
         # the unit of an expression is not known
         real = {"unit": _unit_name(variable.unit)} if variable.unit else {}
+        bounds = (("min", variable.allowed.least), ("max", variable.allowed.most))
+        real |= {key: repr(float(bound)) for key, bound in bounds if math.isfinite(bound)}
         if variable.start is not None:
             real["start"] = repr(variable.start)
         if second:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 import subprocess
 import tempfile
@@ -23,7 +24,7 @@ from gearmbs.mechanism.parts.bodies import markers_kept
 from gearmbs.mechanism.solve.simulator import Simulator
 from gearmbs.mechanism.solve.told import Begun
 from gearmbs.native.asked import Told
-from gearmbs.native.fmu import Description, variables_of, widths_of, write_fmu
+from gearmbs.native.fmu import Description, range_of, variables_of, widths_of, write_fmu
 from gearmbs.native.kernels import Kernels
 from gearmbs.native.memory import Memory, Motions, memory_of
 from gearmbs.native.outputs import chosen_outputs
@@ -194,7 +195,10 @@ def export(
             )
         memory = memory_of(begun, numbers, told, kernels.number)
     kinds = _kinds(numbers, inputs)
-    known = {key: (kinds[key], n.unit, n.value(begun.run.state.rdata, begun.point.t)) for key, n in numbers.items()}
+    known = {
+        key: (kinds[key], n.unit, n.value(begun.run.state.rdata, begun.point.t), n.allowed)
+        for key, n in numbers.items()
+    }
     variables = variables_of(known, told, arrays)
     processors = {name: processor or one.processor for name, one in asked.items()}
     folder = Path(folder)
@@ -279,6 +283,11 @@ def _text(value: str) -> str:
     )
 
 
+def _number(value: float) -> str:
+    """Return a number as C writes it."""
+    return repr(value) if math.isfinite(value) else f"{'-' if value < 0.0 else ''}HUGE_VAL"
+
+
 def _array(kind: str, name: str, items: Sequence[Any]) -> str:
     """Return an array of C; one of nothing holds a zero."""
     return f"static {kind} {name}[] = {{{', '.join(map(str, items)) or '0'}}};"
@@ -319,6 +328,9 @@ def _texts(
     pieces = pieces_of(layout.block)
     lines.append(_array("const int64_t", "pieces", pieces.ravel().tolist()))
     lines.append(_array("const int64_t", "widths", widths))
+    ranges = [range_of(number) for number in numbers.values()]
+    for key, bounds in (("least", [least for least, _ in ranges]), ("most", [most for _, most in ranges])):
+        lines.append(_array("const double", key, [_number(bound) for bound in bounds]))
     token = hashlib.sha256("\n".join([digest, title, *lines]).encode()).hexdigest()[:32]
     fields = {
         "name": _text(title), "digest": _text(digest), "token": _text(token),
@@ -331,7 +343,7 @@ def _texts(
         **memory.structs, **memory.members,
         "counts": int(any(one.counted.starts for one in told)),
         "numbers": len(numbers), "outputs": len(told), "unknowns": begun.problem.n,
-        **{key: key for key in names},
+        **{key: key for key in names}, "least": "least", "most": "most",
         "motions": "0" if memory.motions is None else "&motions",
     }  # fmt: skip
     if memory.motions is not None:
@@ -382,6 +394,7 @@ def _compile(
     declared = sorted({one.symbol for one in (*numbered, *late.values())})
     head = [
         '#include "model.h"',
+        "#include <math.h>",
         *(f"extern int {symbol}();" for symbol in declared),
         f"enum {{ LATE = {len(late)} }};",
         _array("void *const", "kernels", [f"(void *){one.symbol}" for one in numbered]),

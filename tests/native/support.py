@@ -21,6 +21,7 @@ FUNCTIONS = {
     "time": (c_double, [c_void_p]),
     "steps": (c_longlong, [c_void_p]),
     "set": (c_int, [c_void_p, c_size_t, c_double]),
+    "number_range": (c_int, [c_size_t, c_void_p, c_void_p]),
     "number": (c_int, [c_void_p, c_size_t, c_void_p]),
     "advance": (c_int, [c_void_p, c_double]),
     "get": (c_int, [c_void_p, c_void_p]),

@@ -43,10 +43,14 @@ MODELS = {
 }
 
 
-@pytest.mark.parametrize("model", MODELS)
-def test_every_kernel_of_a_model_is_compiled_ahead(model, numbered, tmp_path):
+LUMPED = ("pair", "bench")
+"""Those whose bodies are integrated by angles alone, or as fewer, if that is asked for."""
+
+
+@pytest.mark.parametrize(("model", "lump"), [*((name, False) for name in MODELS), *((name, True) for name in LUMPED)])
+def test_every_kernel_of_a_model_is_compiled_ahead(model, lump, numbered, tmp_path):
     made = MODELS[model]()
-    export(made[0] if isinstance(made, tuple) else made, tmp_path, t_end=1e-4)
+    export(made[0] if isinstance(made, tuple) else made, tmp_path, t_end=1e-4, lump=lump)
     assert len(numbered) > 12
     assert {address(kernel) for kernel in numbered} <= set(ahead.exportable())
 

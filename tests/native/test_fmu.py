@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import gearmbs as gm
+from gearmbs.dae.problem import ANY
 from gearmbs.mechanism import ModelError
 from gearmbs.native import export
 from gearmbs.native.asked import Told
@@ -456,7 +457,9 @@ def test_arrays(tmp_path):
 
 def test_units_of_a_description():
     """By base units where their powers are whole, else by name."""
-    variables = variables_of({"k": ("parameter", "N/m^1.3", 2.0), "u": ("input", "N*m", 1.0)}, [Told("w", "rad/s", ())])
+    variables = variables_of(
+        {"k": ("parameter", "N/m^1.3", 2.0, ANY), "u": ("input", "N*m", 1.0, ANY)}, [Told("w", "rad/s", ())]
+    )
     told = Description("model", "model", "token", "tool", 0.0, 1.0, variables)
     for version in ("2.0", "3.0"):
         root = ElementTree.fromstring(model_description(told, version))

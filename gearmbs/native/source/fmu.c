@@ -81,9 +81,20 @@ int fmu_get(fmu *self, const unsigned *references, size_t count, double *values)
     return FMU_OK;
 }
 
+/* Tell which variable cannot have a value, and which it can have. */
+static int out_of_range(const fmu *self, unsigned reference, double value) {
+    char text[400];
+    double least, most;
+    gearmbs_number_range(reference, &least, &most);
+    snprintf(text, sizeof text, "%.200s = %.9g: it must lie between %.9g and %.9g.", gearmbs_number_name(reference), value,
+             least, most);
+    return fmu_refuse(self, text);
+}
+
 int fmu_set(fmu *self, const unsigned *references, size_t count, const double *values) {
     for (size_t k = 0; k < count; k++) {
         int code = gearmbs_set(self->instance, references[k], values[k]);
+        if (code == GEARMBS_OUT_OF_RANGE) return out_of_range(self, references[k], values[k]);
         if (code != GEARMBS_OK) return status_of(self, code);
     }
     self->known = 0;
@@ -95,7 +106,7 @@ static int moved(fmu *self, const void *state, const unsigned *known, size_t col
                  const double *along, double part) {
     int code = GEARMBS_OK;
     for (size_t k = 0; k < columns && code == GEARMBS_OK; k++)
-        code = gearmbs_set(self->instance, known[k], from[k] + part * along[k]);
+        code = gearmbs_put(self->instance, known[k], from[k] + part * along[k]);
     if (code == GEARMBS_OK) code = gearmbs_take_effect(self->instance);
     if (code == GEARMBS_OK) code = gearmbs_get(self->instance, self->outputs);
     int back = gearmbs_restore(self->instance, state, gearmbs_state_size());

@@ -3,6 +3,7 @@
 #include "gearmbs.h"
 #include "model.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -56,6 +57,8 @@ const char *gearmbs_message(int code) {
                "one or behind the end, a state of another model.";
     case GEARMBS_NO_ROOM: return "The factors of a matrix have more entries than the library has room for.";
     case GEARMBS_KERNEL_FAILED: return "A compiled function asked for Python, or for a kernel that was left out.";
+    case GEARMBS_OUT_OF_RANGE:
+        return "A number cannot have this value, as a stiffness below zero: see gearmbs_number_range.";
     default: return "Unknown code.";
     }
 }
@@ -119,7 +122,20 @@ double gearmbs_integrated(const gearmbs_instance *instance) {
 
 long long gearmbs_steps(const gearmbs_instance *instance) { return read_word(at(instance, model->steps)); }
 
+int gearmbs_number_range(size_t number, double *least, double *most) {
+    if (number >= gearmbs_numbers()) return GEARMBS_REFUSED;
+    *least = model->least[number];
+    *most = model->most[number];
+    return GEARMBS_OK;
+}
+
 int gearmbs_set(gearmbs_instance *instance, size_t number, double value) {
+    if (number < gearmbs_numbers() && (value < model->least[number] || value > model->most[number]))
+        return isinf(value) ? GEARMBS_REFUSED : GEARMBS_OUT_OF_RANGE;
+    return gearmbs_put(instance, number, value);
+}
+
+int gearmbs_put(gearmbs_instance *instance, size_t number, double value) {
     if (number >= gearmbs_numbers() || !(value - value == 0.0)) return GEARMBS_REFUSED;
     write_word((unsigned char *)at(instance, model->waiting) + 8 * number, 1);
     memcpy((unsigned char *)at(instance, model->wanted) + 8 * number, &value, sizeof value);

@@ -34,7 +34,8 @@ enum {
     GEARMBS_BELOW_ROUNDING = -13,
     GEARMBS_REFUSED = -20,
     GEARMBS_NO_ROOM = -21,
-    GEARMBS_KERNEL_FAILED = -22
+    GEARMBS_KERNEL_FAILED = -22,
+    GEARMBS_OUT_OF_RANGE = -23
 };
 
 typedef struct gearmbs_instance gearmbs_instance;
@@ -49,6 +50,10 @@ GEARMBS_API double gearmbs_end_time(void);
 GEARMBS_API size_t gearmbs_numbers(void);
 GEARMBS_API const char *gearmbs_number_name(size_t number);
 GEARMBS_API const char *gearmbs_number_unit(size_t number);
+
+/* Write the least and the largest value that a number can be set to, infinite where there is no bound. */
+GEARMBS_API int gearmbs_number_range(size_t number, double *least, double *most);
+
 GEARMBS_API size_t gearmbs_outputs(void);
 GEARMBS_API const char *gearmbs_output_name(size_t output);
 GEARMBS_API const char *gearmbs_output_unit(size_t output);

@@ -3,6 +3,7 @@
 #ifndef GEARMBS_MODEL_H
 #define GEARMBS_MODEL_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 /* Inputs that prescribe motions, in models that have them. */
@@ -45,6 +46,7 @@ typedef struct {
     int64_t numbers, outputs, unknowns;
     const int64_t *widths;                     /* of each number and output how many a variable of its reference has */
     const char *const *number_names, *const *number_units;
+    const double *least, *most;                /* of each number what it can be set to */
     const char *const *output_names, *const *output_units;
     const char *const *unknown_names;
     const motion_tables *motions;              /* NULL without any */
@@ -72,5 +74,9 @@ int gearmbs_factor_for_outputs(int64_t *code, void **error, void *driver, void *
 /* Write what is to stand in the cells where numbers have been set; return whether that is something else. */
 int gearmbs_new_numbers(const motion_tables *tables, double t, const double *rdata, double *values, int64_t *waiting,
                         const double *wanted);
+
+/* Let a number take any value, for derivatives at the ends of its range. */
+struct gearmbs_instance;
+int gearmbs_put(struct gearmbs_instance *instance, size_t number, double value);
 
 #endif
