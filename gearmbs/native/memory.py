@@ -266,12 +266,16 @@ def _other_plans(run: Run) -> list[LUPlan]:
     st, plans = run.state, []
     if not run.problem.small_entries:
         return []
-    for negligible in (*NEGLIGIBLE_IN_NEWTON, NEGLIGIBLE):
+    nothing = np.zeros(len(run.indices), dtype=bool)
+    counted = [(negligible, nothing.copy()) for negligible in (*NEGLIGIBLE_IN_NEWTON, NEGLIGIBLE)]
+    if run.problem.couplings is not None:
+        # all that modes condensed one by one may ever meet; at the start most of it has not counted yet
+        counted.append((NEGLIGIBLE_IN_NEWTON[0], ~run.problem.couplings))
+    for negligible, known in counted:
         with contextlib.suppress(SingularMatrixError):
-            counted = np.zeros(len(run.indices), dtype=bool)
             plans.append(
                 analyse(
-                    run.indptr, run.indices, st.matrix, run.scale, 0.0, counted, negligible, with_tail=True,
+                    run.indptr, run.indices, st.matrix, run.scale, 0.0, known, negligible, with_tail=True,
                     couplings=run.problem.couplings, modes=run.problem.modes,
                 )
             )  # fmt: skip

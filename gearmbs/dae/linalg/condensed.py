@@ -87,7 +87,19 @@ def places_in_group(modes, rows, columns):
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _make_rows(wide, high, moved, made, numbers, by_v, by_q, after_v, after_q):
-    """Write c'_v and c'_q of the modes of a body; arguments as of `_condense_group`."""
+    """Write c'_v and c'_q of the modes of a body.
+
+    Parameters
+    ----------
+    wide, high : int
+        Modes and rows of the body's block, filled up to whole lanes.
+    moved : int
+        Lanes of rows that are entered by v.
+    made, by_v, by_q, after_v, after_q : int
+        Where these parts of its numbers begin, see `places_in_group`.
+    numbers : ndarray
+        Of the body.
+    """
     rows = high // LANES
     by_qv, pivot, own_qq = made + BY_QV * wide, made + PIVOT * wide, QQ * wide
     for k in range(wide):
@@ -104,7 +116,19 @@ def _make_rows(wide, high, moved, made, numbers, by_v, by_q, after_v, after_q):
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _make_columns(wide, columns, rated, pushed, made, numbers, b_p, b_v, b_q, b):
-    """Write b of the modes of a body; arguments as of `_condense_group`."""
+    """Write b of the modes of a body.
+
+    Parameters
+    ----------
+    wide, made, numbers
+        As of `_make_rows`.
+    columns : int
+        Of the body's block, filled up to whole tiles.
+    rated, pushed : int
+        How many columns meet b_q, and the first one that meets b_v.
+    b_p, b_v, b_q, b : int
+        Where these parts of its numbers begin.
+    """
     for m in range(wide // LANES):
         f, g = lanes_at(numbers, (made + F * wide) // LANES + m), lanes_at(numbers, (made + G * wide) // LANES + m)
         for j in range(columns):
@@ -119,7 +143,20 @@ def _make_columns(wide, columns, rated, pushed, made, numbers, b_p, b_v, b_q, b)
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _four_sums(sums, numbers, wide, rows, row, columns, column, after, b):
-    """Return four sums over modes of a lane of rows times one column each, added to ``sums``."""
+    """Return four sums over modes of a lane of rows times one column each, added to ``sums``.
+
+    Parameters
+    ----------
+    sums : four lanes
+    numbers, wide : ndarray, int
+        As of `_make_rows`.
+    rows, row : int
+        Lanes of rows, and which of them.
+    columns, column : int
+        Columns, and the first of the four.
+    after, b : int
+        Where the factors of the products begin: c'_v or c'_q, and b_q or b.
+    """
     one, two, three, four = sums
     at = after // LANES + row
     for m in range(wide // LANES):
@@ -143,7 +180,17 @@ def _four_sums(sums, numbers, wide, rows, row, columns, column, after, b):
     fastmath={"contract"},
 )
 def _multiply(wide, high, columns, moved, rated, numbers, after_v, after_q, b_q, b, product):
-    """Write c'_v b_q + c'_q b, summed over the modes of a body, to its block; arguments as of `_condense_group`."""
+    """Write c'_v b_q + c'_q b, summed over the modes of a body, to its block.
+
+    Parameters
+    ----------
+    wide, high, moved, numbers
+        As of `_make_rows`.
+    columns, rated
+        As of `_make_columns`.
+    after_v, after_q, b_q, b, product : int
+        Where these parts of its numbers begin.
+    """
     rows = high // LANES
     for column in range(0, columns, TILE):
         for row in range(rows):
@@ -283,7 +330,15 @@ def note_moving(fill_src, rest_src, slope, moving):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def fill_moving(fill_at, fill_src, rest_src, rest_scale, vals, every, rest, moving):
-    """Write the entries that `note_moving` has noted as `fill` does, all others being what they were."""
+    """Write the entries that `note_moving` has noted as `fill` does, all others being what they were.
+
+    Parameters
+    ----------
+    fill_at, fill_src, rest_src, rest_scale, vals, every, rest
+        As of `fill`.
+    moving : ndarray
+        Of `note_moving`.
+    """
     first = 2 + np.int64(moving[0])
     for m in range(2, first):
         k = np.int64(moving[m])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -434,24 +434,17 @@ def analyse(
     """
     if not np.isfinite(vals).all():
         raise ValueError("the matrix has entries that are not finite")
-    scale, choose = np.asarray(scale, dtype=float), direct(scale_and_choose)
-    n = len(indptr) - 1
-    columns, rows = lines_for(indptr, indices) if lines is None else lines
+    scale = np.asarray(scale, dtype=float)
+    lines = lines_for(indptr, indices) if lines is None else lines
     counted = np.ones(len(indices), dtype=bool) if counted is None else counted
     modes = NO_MODES if modes is None or drop > 0.0 else modes
     spared = None if couplings is None or negligible < NEGLIGIBLE_IN_NEWTON[0] else couplings & ~counted
     whole, vals = vals, vals if spared is None else np.where(spared, 0.0, vals)
-    while True:
-        rank, *chosen = choose(
-            indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, modes, columns, rows
-        )
-        if rank >= 0:
-            break
-        columns, rows = new_lines(n, 2 * len(columns.pool))
-    if rank < n and not counted.all():
+    rank, *chosen = _chosen(lines, indptr, indices, vals, scale, max(drop, CANCELLED), counted, negligible, modes)
+    if rank < len(indptr) - 1 and not counted.all():
         # what was left out may be what was missing
         return analyse(indptr, indices, whole, scale, drop, with_tail=with_tail)
-    if rank < n and drop == 0.0:
+    if rank < len(indptr) - 1 and drop == 0.0:
         rows, cols = chosen[:2]
         raise SingularMatrixError(rows[rank:], cols[rank:])
     plan = plan_from_pivots(with_tail, rank, *chosen)
@@ -463,6 +456,14 @@ def analyse(
         return plan
     counted |= large
     return analyse(indptr, indices, whole, scale, drop, counted, negligible, with_tail, couplings, modes)
+
+
+def _chosen(lines: tuple[Lines, Lines], *matrix: Any) -> tuple[Any, ...]:
+    """Return what `scale_and_choose` finds for a matrix, with as much scratch as it takes."""
+    columns, rows = lines
+    while (found := direct(scale_and_choose)(*matrix, columns, rows))[0] < 0:
+        columns, rows = new_lines(len(matrix[0]) - 1, 2 * len(columns.pool))
+    return found
 
 
 @njit(float64(_UVEC), cache=True, nogil=True, error_model="numpy")

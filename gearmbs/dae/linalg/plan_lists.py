@@ -78,6 +78,63 @@ def scales_of_rest(indptr, indices, slots, row_scale, col_scale, groups, rows, c
 
 
 @njit(
+    types.Tuple((_UVEC, _IVEC, _IVEC, _IVEC, _UVEC, _UVEC, _UVEC, _UVEC, _UVEC, _UVEC, _VEC, _UVEC, _VEC))(
+        _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC, _IVEC
+    ),
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+)
+def lists_of_modes(rows, row_scale, col_scale, taken, indptr, indices, apart):
+    """Return the entries of the matrix that a condensation leaves, and the fields of a plan that say how it is done.
+
+    Parameters
+    ----------
+    rows, row_scale, col_scale, taken, indptr, indices, apart
+        As of `lists_of_plan`.
+
+    Returns
+    -------
+    taken, indptr, indices : ndarray
+        As they are given where nothing is condensed; else places among the values that are left, and their pattern.
+    groups, mode_at, row_at, column_at, fill_at, fill_src, rest_src, rest_scale, schur_at, schur_scale : ndarray
+        See `gearmbs.dae.linalg.lu_plan.LUPlan`.
+    """
+    none, nothing = np.empty(0, dtype=np.uint32), np.empty(0)
+    if apart.shape[0] == 0:
+        empty = np.empty(0, dtype=np.int64)
+        return taken, indptr, indices, empty, none, none, none, none, none, none, nothing, none, nothing
+    groups, mode_at, met, column_at = groups_of(indptr, indices, apart)
+    fill_at, fill_src = filled(indptr, indices, apart, groups, met, column_at)
+    part_ptr, part, slots, rest_src, schur_at = reduced_pattern(indptr, indices, apart, groups, met, column_at)
+    rest_scale, schur_scale = scales_of_rest(
+        part_ptr, part, slots, row_scale, col_scale, groups, met, column_at, rest_src.shape[0]
+    )
+    row_at = places_of(rows)[met].astype(np.uint32)
+    fill_src, rest_src = taken[fill_src], taken[rest_src]
+    return (
+        slots, part_ptr, part, groups, mode_at, row_at, column_at, fill_at, fill_src, rest_src, rest_scale, schur_at,
+        schur_scale,
+    )  # fmt: skip
+
+
+@njit(_IVEC(int64, _IVEC, _UVEC), cache=True, nogil=True, error_model="numpy")
+def nodes_beside(tail, l_ptr, l_pos):
+    """Return `gearmbs.dae.linalg.schedule.nodes`, or each column as its own node if too few of L stand in nodes.
+
+    Where there is a tail all columns would act on it one after the other, those outside of nodes, too.
+    """
+    n, node_end = l_ptr.shape[0] - 1, nodes(l_ptr, l_pos)
+    if tail == n:
+        return node_end
+    in_nodes = 0
+    for k in range(n):
+        if node_end[k] > k + 1:
+            in_nodes += l_ptr[k + 1] - l_ptr[k]
+    return node_end if in_nodes >= MOSTLY_NODES * l_pos.shape[0] else np.arange(1, n + 1)
+
+
+@njit(
     types.Tuple((int64, int64, *_TYPES))(
         boolean, int64, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _IVEC, _VEC, _VEC, _UVEC, _IVEC, _IVEC, _IVEC
     ),
@@ -109,31 +166,16 @@ def lists_of_plan(
         `LISTS`.
     """
     n = rows.shape[0]
-    no_places, no_numbers = np.empty(0, dtype=np.uint32), np.empty(0)
-    no_bounds = np.empty(0, dtype=np.int64)
+    no_places, no_numbers, no_bounds = np.empty(0, dtype=np.uint32), np.empty(0), np.empty(0, dtype=np.int64)
     tail_at, tail_src, tail_scale, block_col, lane_ptr = no_places, no_places, no_numbers, no_places, no_bounds
     block_ptr, block_at, block_lane = no_bounds, no_bounds, no_bounds
     act_ptr, act_to, act_by, act_u, last_ptr, last_to = no_bounds, no_places, no_places, no_places, no_bounds, no_places
     part_ptr, part_at, part_col = no_bounds, no_places, no_places
     above_ptr, above_col, above_at = no_bounds, no_places, no_places
-    groups, mode_at, row_at, column_at, fill_at, fill_src = (
-        no_bounds,
-        no_places,
-        no_places,
-        no_places,
-        no_places,
-        no_places,
-    )
-    rest_src, rest_scale, schur_at, schur_scale = no_places, no_numbers, no_places, no_numbers
-    if apart.shape[0] > 0:
-        groups, mode_at, row_at, column_at = groups_of(indptr, indices, apart)
-        fill_at, fill_src = filled(indptr, indices, apart, groups, row_at, column_at)
-        indptr, indices, slots, rest_src, schur_at = reduced_pattern(indptr, indices, apart, groups, row_at, column_at)
-        rest_scale, schur_scale = scales_of_rest(
-            indptr, indices, slots, row_scale, col_scale, groups, row_at, column_at, rest_src.shape[0]
-        )
-        fill_src, rest_src, taken = taken[fill_src], taken[rest_src], slots
-        row_at = places_of(rows)[row_at].astype(np.uint32)
+    (
+        taken, indptr, indices, groups, mode_at, row_at, column_at, fill_at, fill_src, rest_src, rest_scale, schur_at,
+        schur_scale,
+    ) = lists_of_modes(rows, row_scale, col_scale, taken, indptr, indices, apart)  # fmt: skip
     tail = tail_of_plan(rank, l_ptr, u_ptr) if with_tail else n
     if tail < n:
         l_ptr, l_rows = without_tail(tail, l_ptr, l_rows)
@@ -151,15 +193,7 @@ def lists_of_plan(
         a_ptr, a_pos, a_src, a_scale, tail_at, tail_src, tail_scale = entries_in_blocks(
             tail, block_ptr, block_at, block_lane, a_ptr, a_pos, a_src, a_scale
         )
-    node_end = nodes(l_ptr, l_pos)
-    if tail < n:
-        in_nodes = 0
-        for k in range(n):
-            if node_end[k] > k + 1:
-                in_nodes += l_ptr[k + 1] - l_ptr[k]
-        if in_nodes < MOSTLY_NODES * l_pos.shape[0]:
-            # column by column all others would act on the tail one after the other, too
-            node_end = np.arange(1, n + 1)
+    node_end = nodes_beside(tail, l_ptr, l_pos)
     if has_nodes(node_end):
         # factors stand as the columns do, each a level of its own
         l_to, l_by, u_to, u_by, a_to = l_pos, l_col, u_pos, u_col, no_places
