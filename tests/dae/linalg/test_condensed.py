@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+import gearmbs as gm
 from gearmbs.dae.linalg.condensed import GROUP, MODES
 from gearmbs.dae.linalg.condensed_lists import FEWEST
-from gearmbs.dae.linalg.lu_plan import analyse, parity
+from gearmbs.dae.linalg.entry_lists import NEGLIGIBLE_IN_NEWTON
+from gearmbs.dae.linalg.lu_plan import SingularMatrixError, analyse, parity
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors, refactor_carried, solve
+from tests.mechanism.test_stepping import flexible_pair
 
 
 def bodies_on_joints(counts, rest, seed, gamma=1e4):
@@ -72,6 +75,69 @@ def test_solutions_are_those_of_the_matrix(counts, rest, with_tail):
             solve(plan, factors, b, b)
             np.testing.assert_array_equal(b, x)
         a.data = a.data * rng.uniform(0.9, 1.1, a.nnz)
+
+
+@pytest.mark.parametrize("gamma", [1e1, 1e4, 1e7])
+@pytest.mark.parametrize(
+    ("mass", "damping", "stiffness"), [(0.0, 1.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+)
+def test_modes_without_mass_damping_or_stiffness(gamma, mass, damping, stiffness):
+    a, modes = bodies_on_joints((8, 5), 15, 8, gamma)
+    p, v, q = modes.reshape(-1, 4)[::2, :3].T
+    n, whole = a.shape[0], sp.lil_array(a)
+    for i, j, share in ((v, v, mass), (p, v, damping), (p, q, stiffness)):
+        for k in range(len(p)):
+            whole[i[k], j[k]] *= share
+    for k in range(len(p)):
+        # nothing but the mode's own
+        whole[v[k], q[k]] = 0.0
+    a = sp.csc_array(whole)
+    plan = analyse(*pattern(a), np.ones(n), modes=modes)
+    assert len(modes_of(plan)) == 13
+    factors, x, b = new_factors(plan), np.empty(n), np.random.default_rng(1).standard_normal(n)
+    assert factor(plan, factors, a.data) < GROWTH_LIMIT
+    solve(plan, factors, b, x)
+    assert residue(a, x, b) < max(1e-11, 10.0 * np.finfo(float).eps * gamma)
+
+
+def test_a_mode_of_nothing_is_a_singular_matrix_as_without_condensation():
+    a, modes = bodies_on_joints((8,), 15, 8)
+    p, v, q, _ = modes.reshape(-1, 4)[3]
+    whole = sp.lil_array(a)
+    whole[[v], :] = 0.0
+    whole[:, [v, q]] = 0.0
+    whole[v, p], whole[q, v], whole[q, q] = 1.0, 1.0, -1e4
+    for given in (None, modes):
+        with pytest.raises(SingularMatrixError):
+            analyse(*pattern(sp.csc_array(whole)), np.ones(a.shape[0]), modes=given)
+
+
+@pytest.mark.slow
+def test_newton_matrices_of_shafts_at_other_steps():
+    """What the matrix is carried over to a tenth of the step and ten times it, solved for unknowns that are known."""
+    m, options = flexible_pair()
+    sim = gm.Simulator(m, 0.01, lump=False, **options)
+    rng = np.random.default_rng(3)
+    for t in (0.001, 0.003):
+        sim.advance(t)
+        run, st = sim._run, sim._run.state
+        n, problem = len(run.scale), run.problem
+        for share in (0.1, 1.0, 10.0):
+            gamma = share * st.gamma
+            vals = st.jac + (gamma - st.gamma_evaluated) * st.jac_slope
+            counted = ~problem.couplings
+            between = counted, NEGLIGIBLE_IN_NEWTON[0], True, problem.couplings
+            plan = analyse(run.indptr, run.indices, vals, run.scale, 0.0, *between, problem.modes)
+            assert len(plan.mode_at) == 3 * 32
+            vals[plan.left_src] = 0.0
+            factors, x = new_factors(plan), np.empty(n)
+            assert factor(plan, factors, vals) < GROWTH_LIMIT
+            a = sp.csc_array((vals, run.indices, run.indptr), shape=(n, n))
+            known = run.scale * rng.standard_normal(n)
+            b = a @ known
+            solve(plan, factors, b, x)
+            assert residue(a, x, b) < 1e-8
+            np.testing.assert_allclose(x / run.scale, known / run.scale, atol=1e-5)
 
 
 def modes_of(plan):
