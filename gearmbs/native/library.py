@@ -70,7 +70,7 @@ class Exported:
         Outputs of the mechanism that the library does not tell.
     held : list of str
         Inputs and parameters of the mechanism that cannot be set, and keep their values: they prescribe positions,
-        which cannot jump, or motions of a run with breakpoints.
+        which cannot jump, or motions of a run with breakpoints or of bodies that are lumped.
     processor : str
         What it runs on, of the first system.
     """
