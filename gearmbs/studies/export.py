@@ -188,6 +188,12 @@ def export(
         str, typer.Option(help="linux, windows, linux-arm64, with commas between; an FMU is for all of them.")
     ] = "linux",
     arrays: Annotated[bool, typer.Option("--arrays", help="Of fmu3: vectors as arrays, not one by one.")] = False,
+    lump: Annotated[
+        bool, typer.Option("--lump", help="Integrate bodies that are fixed to each other as one, outputs are of all.")
+    ] = False,
+    fixed_pivots: Annotated[
+        bool, typer.Option("--fixed-pivots", help="Last digits do not depend on where outputs have been looked at.")
+    ] = False,
     torques: Annotated[
         str | None, typer.Option(help='Of tables, on the driven wheel, e.g. "20 N m, 50 N m"; default: about the load.')
     ] = None,
@@ -203,6 +209,8 @@ def export(
         if file is None:
             raise ValueError("give a file that describes a case, a planetary set or a drivetrain")
         if target in TABLES:
+            if lump or fixed_pivots:
+                raise ValueError(f"--lump and --fixed-pivots are of libraries and FMUs; leave them out for {target}")
             if inputs is not None or outputs is not None:
                 raise ValueError(f"--inputs and --outputs are of libraries and FMUs; leave them out for {target}")
             for path in write_tables(file, out or file.with_suffix(""), target, torques):
@@ -218,7 +226,7 @@ def export(
         made = exported(
             mechanism, folder, target=target, t_end=t_end or end, name=name, inputs=items_of(inputs),
             outputs=ALL if outputs == ALL else items_of(outputs), processor=processor,
-            systems=items_of(systems) or (), arrays=arrays, **options,
+            systems=items_of(systems) or (), arrays=arrays, lump=lump, fixed_pivots=fixed_pivots, **options,
         )  # fmt: skip
         for what, named in (("set", made.numbers), ("told", made.outputs)):
             typer.echo(f"can be {what}: {len(named)}")

@@ -34,6 +34,11 @@ def test_a_case_becomes_a_library(tmp_path):
     done = CliRunner().invoke(app, ["export", str(file), *chosen])
     assert done.exit_code == 0, done.output
     assert "can be told: 3" in done.output
+    done = CliRunner().invoke(app, ["export", str(file), "--name", "lumped", "--lump", "--fixed-pivots"])
+    assert done.exit_code == 0, done.output
+    lumped = Library(tmp_path / "pair" / "lumped.so")
+    assert lumped.output_names == library.output_names
+    assert lumped.unknowns() < library.unknowns()
 
 
 @pytest.mark.parametrize(
@@ -42,6 +47,7 @@ def test_a_case_becomes_a_library(tmp_path):
         (["no.toml", "--target", "fmi2"], ["'fmi2'", "did you mean 'fmu2'"]),
         (["no.toml", "--target", "exe"], ["'exe'", "'modelica'"]),
         (["no.toml", "--target", "csv", "--outputs", "a"], ["--outputs", "leave them out"]),
+        (["no.toml", "--target", "csv", "--lump"], ["--lump", "leave them out"]),
         ([], ["give a file"]),
     ],
 )
