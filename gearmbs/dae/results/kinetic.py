@@ -29,8 +29,7 @@ _VEC = float64[::1]
 _MAT = float64[:, ::1]
 
 MASS, INERTIA = 0, 1
-INERTIA_COLUMNS = 10
-"""Mass and inertia of a body in the table of them."""
+"""Columns of the table of bodies: the mass, and from the second on the nine moments of inertia."""
 MODES, INTEGRALS = 0, 1
 MODAL_COLUMNS = 2
 """How many modes a body has, and where its integrals begin in the table of them."""
@@ -41,7 +40,7 @@ class Inertias(NamedTuple):
 
     Attributes
     ----------
-    bodies : ndarray, shape (bodies, INERTIA_COLUMNS)
+    bodies : ndarray, shape (bodies, 10)
         Mass, kg, and inertia in the body's own axes, kg m^2.
     modal : ndarray of int64, shape (MODAL_COLUMNS bodies,)
     integrals : ndarray
