@@ -39,6 +39,7 @@ from .loads import TorqueLoad as TorqueLoad
 from .loads import gear_pump_ripple as gear_pump_ripple
 from .members.carrier import FlexibleCarrier as FlexibleCarrier
 from .members.pins import rolling_pins as rolling_pins
+from .members.wheel import FlexibleWheel as FlexibleWheel
 from .part import DrivetrainError as DrivetrainError
 from .parts import SENSORS as SENSORS
 from .parts import Accelerometer as Accelerometer

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from gearmbs.drivetrain.connections import Bearing
-from gearmbs.drivetrain.housing import MODES, Housing, Mount
+from gearmbs.drivetrain.housing import Housing, Mount
 from gearmbs.drivetrain.members.carrier import carrier_models
+from gearmbs.drivetrain.members.shaft_body import Width, shaft_body
+from gearmbs.drivetrain.members.sources import ALL, MODES, ROUND
 from gearmbs.drivetrain.part import errors_named, require
 from gearmbs.drivetrain.planetary import carried
-from gearmbs.drivetrain.shaft import ALL, Shaft
+from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.flexible import Disc, FiniteElementModel, Interface, ModalModel, Seat, reduce_model
 from gearmbs.flexible import Shaft as SectionedShaft
 from gearmbs.flexible.modal_model import REACH, shapes_at
@@ -27,15 +29,22 @@ SAME_SEAT = 0.5 * REACH
 
 _LENGTHS = Measure("length", above=0, several=2)
 
-ROUND = 1.02
-"""Radius within which nodes are in a seat, over that of the bearing: what a mesh rounds of the circle they are on."""
-
 
 def modal_models(train: Drivetrain) -> dict[str, ModalModel]:
-    """Return the bodies with modes of a drivetrain's shafts, housings and carriers that have them, by name."""
-    found = {shaft.name: shaft_model(train, shaft) for shaft in train.shafts if shaft.modes is not None}
+    """Return the bodies with modes of a drivetrain's shafts, housings, carriers and wheels that have them, by name."""
+    found = {shaft.name: shaft_model(train, shaft) for shaft in train.shafts if shaft.bends}
     found |= {h.name: housing_model(train, h) for h in train.housings if h.model is not None}
-    return found | carrier_models(train)
+    return found | carrier_models(train) | wheel_models(train)
+
+
+def wheel_models(train: Drivetrain) -> dict[str, ModalModel]:
+    """Return the bodies with modes of wheels that deform, by name."""
+    found = {}
+    for wheel in train.wheels:
+        if wheel.flexible is not None:
+            with errors_named(wheel.label):
+                found[wheel.name] = wheel.flexible.body(wheel.name, wheel.gear)
+    return found
 
 
 # --- shafts ---------------------------------------------------------------------------------------
@@ -67,8 +76,34 @@ def shaft_seats(train: Drivetrain, shaft: Shaft) -> dict[str, float]:
     return {", ".join(names): z for names, z in groups}
 
 
+def seat_sizes(train: Drivetrain, shaft: Shaft) -> dict[str, Width]:
+    """Return what is known of how large the seats of parts on a shaft are, by name."""
+    out: dict[str, Width] = {}
+    for wheel in train.wheels:
+        if wheel.shaft == shaft.name:
+            out[wheel.name] = Width(2.0 * wheel.gear.bore_radius or None, wheel.gear.face_width)
+    for stage in train.planetary_stages:
+        if stage.sun == shaft.name:
+            out[f"{stage.name} sun"] = Width(2.0 * stage.gears.sun.bore_radius or None, stage.gears.sun.face_width)
+    for bearing in train.bearings:
+        if bearing.shaft == shaft.name and bearing.rolling is not None:
+            out[bearing.name] = Width(bearing.rolling.bore, bearing.rolling.width)
+    return out
+
+
+def _whole_seat(sizes: dict[str, Width], names: str) -> Width:
+    """Return the size of the seat of parts at one station: the widest."""
+    found = [sizes[name] for name in names.split(", ") if name in sizes]
+    return max(found, key=lambda size: size.width or 0.0, default=Width(None, None))
+
+
 def shaft_model(train: Drivetrain, shaft: Shaft, *, bare: bool = False) -> ModalModel:
     """Return a shaft with its wheels, or ``bare``, as a body with modes."""
+    if shaft.model is not None:
+        sizes = seat_sizes(train, shaft)
+        at = {names: (z, _whole_seat(sizes, names)) for names, z in shaft_seats(train, shaft).items()}
+        with errors_named(shaft.label):
+            return shaft_body(shaft, at)
     discs = [
         Disc(one.station, mass=one.mass, polar=one.inertia[2], diametral=one.inertia[0], name=one.name)
         for one in ([] if bare else carried(train, shaft.name))

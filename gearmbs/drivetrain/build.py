@@ -18,6 +18,7 @@ from gearmbs.drivetrain.drives import Drive
 from gearmbs.drivetrain.housing import Housing
 from gearmbs.drivetrain.kinematics import joined
 from gearmbs.drivetrain.loads import Load
+from gearmbs.drivetrain.members.wheel import BORE, IN_SHAFT, RIM, seat_of_wheel
 from gearmbs.drivetrain.part import Attached, DrivetrainError, Part, errors_named, require
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
@@ -358,7 +359,9 @@ class _Builder:
         """Add the body of a shaft with its wheels, a marker at each wheel."""
         train, layout = self.train, self.layout
         seat = layout.seats[shaft.name]
-        bare = any(wheel.name in self.apart for wheel in train.wheels if wheel.shaft == shaft.name)
+        wheels = [wheel for wheel in train.wheels if wheel.shaft == shaft.name]
+        # of a finite-element shaft they stand on it as bodies of their own
+        bare = shaft.model is not None or any(wheel.name in self.apart for wheel in wheels)
         if not bare:
             self._warn_of_solid_wheels(shaft)
         spin = train.start_share * train.speeds[shaft.name] * layout.paces[shaft.name]
@@ -367,33 +370,49 @@ class _Builder:
             "orientation": seat.axes @ turn_z(layout.angles[shaft.name]),
             "angular_velocity": spin * seat.axes[:, 2],
         }
-        if shaft.modes is None:
+        if not shaft.bends:
             body = self._rigid_shaft(shaft, where, bare=bare)
         else:
-            model = shaft_model(train, shaft, bare=True) if bare else train.modal_models[shaft.name]
+            known = not bare or shaft.model is not None
+            model = train.modal_models[shaft.name] if known else shaft_model(train, shaft, bare=True)
             body = model.add_to(self.m, shaft.name, damping=shaft.damping, **where)
-        for wheel in train.wheels:
-            if wheel.shaft == shaft.name:
-                turned = turn_z(layout.wheels[wheel.name])
-                place = body.marker(
-                    (0.0, 0.0, train.station(wheel)), turned, name=f"{wheel.name}.I" if bare else wheel.name
-                )
-                self.wheels[wheel.name] = self._apart(wheel, place, where["angular_velocity"]) if bare else place
+        for wheel in wheels:
+            own = wheel.flexible is not None or (bare and wheel.body != IN_SHAFT)
+            turned = turn_z(layout.wheels[wheel.name])
+            place = body.marker((0.0, 0.0, train.station(wheel)), turned, name=f"{wheel.name}.I" if own else wheel.name)
+            self.wheels[wheel.name] = self._apart(wheel, place, where["angular_velocity"]) if own else place
+        if shaft.model is not None:
+            self._members_apart(shaft, body, where["angular_velocity"])
 
     def _apart(self, wheel: Wheel, place: Marker, angular_velocity: np.ndarray) -> Marker:
         """Return the marker of a wheel that is a body of its own, fixed to its place on its shaft."""
-        gear = wheel.gear
-        body = self.m.body(
-            wheel.name,
-            gear.mass,
-            gear.inertia,
-            position=place.global_position(),
-            orientation=place.global_orientation(),
-            angular_velocity=angular_velocity,
-        )
-        marker = body.marker(name=f"{wheel.name}.mesh")
-        self.m.joint("fixed", self.apart[wheel.name], marker, place)
+        where = {
+            "position": place.global_position(),
+            "orientation": place.global_orientation(),
+            "angular_velocity": angular_velocity,
+        }
+        if wheel.flexible is None:
+            mass, moments = wheel.weight
+            marker = held = self.m.body(wheel.name, mass, moments, **where).marker(name=wheel.name)
+        else:
+            model = self.train.modal_models[wheel.name]
+            body = model.add_to(self.m, wheel.name, damping=wheel.flexible.damping, **where)
+            held = model.seat_marker(body, BORE, name=f"{wheel.name}.{BORE}")
+            marker = model.seat_marker(body, RIM, name=wheel.name)
+        self.m.joint("fixed", self.apart.get(wheel.name, seat_of_wheel(wheel.name)), held, place)
         return marker
+
+    def _members_apart(self, shaft: Shaft, body: Body, angular_velocity: np.ndarray) -> None:
+        """Add suns, carriers and rings on a finite-element shaft, whose masses are not in its model, fixed to it."""
+        wheels = {wheel.name for wheel in self.train.wheels}
+        for one in carried(self.train, shaft.name):
+            if one.name not in wheels and one.mass > 0.0:
+                place = body.marker((0.0, 0.0, one.station), name=f"{one.name}.I")
+                held = self.m.body(
+                    one.name, one.mass, one.inertia, position=place.global_position(),
+                    orientation=place.global_orientation(), angular_velocity=angular_velocity,
+                ).marker(name=f"{one.name}.J")  # fmt: skip
+                self.m.joint("fixed", seat_of_wheel(one.name), held, place)
 
     def _rigid_shaft(self, shaft: Shaft, where: dict[str, Any], *, bare: bool) -> Body:
         """Return the body of a rigid shaft with its wheels, or without."""
@@ -413,7 +432,7 @@ class _Builder:
             # a mass from a drawing or a scale leaves open what is in it
             return
         train = self.train
-        wheels = {w.name: (w.gear, train.station(w)) for w in train.wheels if w.shaft == shaft.name}
+        wheels = {w.name: (w.gear, train.station(w)) for w in train.wheels if w.shaft == shaft.name and w.body is None}
         for stage in train.planetary_stages:
             # a mass that was given leaves open what is in it
             if stage.sun == shaft.name and "sun" not in stage.masses:

@@ -101,6 +101,7 @@ PAIR_KEYS = tuple(
     f.name for f in fields(GearPair) if f.init and f.name not in ("driver", "driven", "rotation", "torque")
 )
 HARMONICS = Measure(low=1, whole=True, remedy="give a whole number of mesh harmonics from 1 up")
+OF_WHEELS = ("shaft", "station", "angle", "body")
 GEAR_KEYS = tuple(f.name for f in fields(GearSpec) if f.init and f.name != "name")
 
 
@@ -217,7 +218,7 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None, folder: 
     require(isinstance(table, Mapping), f"{where}: write a table, such as [{where}]")
     settings = {key: _given(f"{where}.{key}", value) for key, value in table.items()}
     if group == "wheels":
-        return _wheel(where, name, settings)
+        return _wheel(where, name, settings, folder)
     if group == "meshes":
         return _mesh(where, name, settings, fault)
     if group == "planetary_stages":
@@ -225,6 +226,8 @@ def _part(group: str, name: str, table: Any, fault: FaultReader | None, folder: 
     if group == "housings":
         return _housing(where, name, settings, folder)
     if group == "shafts":
+        if isinstance(settings.get("model"), Mapping):
+            settings["model"] = _from_folder(where, settings["model"], folder)
         return _of_kind(where, Shaft, name, settings)
     kinds, usual = BY_KIND[group]
     return _of_kind(
@@ -250,10 +253,12 @@ def _of_kind(where: str, kind: type[Part], name: str, settings: Mapping[str, Any
         return make(kind, settings, where, DrivetrainError, name=name)
 
 
-def _wheel(where: str, name: str, settings: dict[str, Any]) -> Wheel:
-    own: dict[str, Any] = {key: settings.pop(key) for key in ("shaft", "station", "angle") if key in settings}
+def _wheel(where: str, name: str, settings: dict[str, Any], folder: Path) -> Wheel:
+    own: dict[str, Any] = {key: settings.pop(key) for key in OF_WHEELS if key in settings}
+    if isinstance(own.get("body"), Mapping) and isinstance(own["body"].get("model"), Mapping):
+        own["body"] = {**own["body"], "model": _from_folder(f"{where}.body", own["body"]["model"], folder)}
     material = {key: settings.pop(key) for key in ("density", "youngs_modulus", "poisson_ratio") if key in settings}
-    known = ["shaft", "station", "angle", *GEAR_KEYS, "tip_radius", "root_radius"]
+    known = [*OF_WHEELS, *GEAR_KEYS, "tip_radius", "root_radius"]
     check_keys(settings, known, where, DrivetrainError, shown=repr)
     for key in ("teeth", "module"):
         require(key in settings, f"{where}: {key} is missing")

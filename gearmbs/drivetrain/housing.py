@@ -3,30 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from gearmbs.drivetrain.members.sources import ALL, axes_of, body_source
 from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, require
-from gearmbs.drivetrain.shaft import ALL, DAMPING, damping_of
+from gearmbs.drivetrain.shaft import DAMPING, damping_of
 from gearmbs.schema.described import chosen
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity
 
-if TYPE_CHECKING:
-    from gearmbs.flexible import ModalModel
-
 Mass = Annotated[Quantity, Measure("mass", above=0)]
 Three = tuple[Quantity, Quantity, Quantity]
-
-TURNED = 1e-6
-"""Largest entry of A A^T - 1 of axes: what six digits of a direction leave."""
-
-MODES = 20
-"""Vibration shapes of a finite-element housing where nothing is said, as of `gearmbs.flexible.reduce_model`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +90,8 @@ class Housing(Part):
         By their numbers; with ``model`` how many of its shapes between bearings and mounts are kept beside the static
         ones (default 20), or of a body with modes how many of these (default all).
     model : FiniteElementModel, ModalModel or mapping, optional
-        Of `gearmbs.flexible`; or a table with ``program``, one of `PROGRAMS`, ``files``, and the keywords of its
+        Of `gearmbs.flexible`; or a table with ``program``, one of
+        `gearmbs.drivetrain.members.sources.PROGRAMS`, ``files``, and the keywords of its
         reader, as ``length = "mm"``.
     axes : sequence of 3 by 3 floats, optional
         Columns: the axes of the nodes' frame in global components; default: the same.
@@ -158,80 +150,11 @@ class Housing(Part):
         chosen(("average", "rigid"), self.faces, f"{self.label}: ", DrivetrainError, "faces")
         with errors_named(f"{self.label}: damping"):
             damping_of(self.damping)
-        self._check_axes()
+        object.__setattr__(self, "axes", axes_of(self.axes, self.label))
         with errors_named(f"{self.label}: model"):
-            object.__setattr__(self, "model", housing_source(self.model))
-
-    def _check_axes(self) -> None:
-        if self.axes is None:
-            return
-        given = np.asarray(self.axes, dtype=float)
-        right = (
-            given.shape == (3, 3) and np.abs(given @ given.T - np.eye(3)).max() < TURNED and np.linalg.det(given) > 0
-        )
-        require(bool(right), f"{self.label}: axes is {self.axes!r}; give 3 rows of a rotation matrix")
-        object.__setattr__(self, "axes", tuple(map(tuple, given.tolist())))
+            object.__setattr__(self, "model", body_source(self.model))
 
     @property
     def turned(self) -> np.ndarray:
         """Axes of the body's frame in global components, as columns."""
         return np.eye(3) if self.axes is None else np.array(self.axes)
-
-
-# Finite-element models and bodies with modes, from the files of other programs.
-
-
-def _neutral_file(path: Any, **options: Any) -> ModalModel:
-    from gearmbs.flexible import read_mnf
-
-    return read_mnf(path).modal_model(**options)
-
-
-def _modes_of_op2(path: Any, **options: Any) -> ModalModel:
-    from gearmbs.flexible import read_op2_modes
-
-    return read_op2_modes(path, **options).modal_model()
-
-
-def _reader(name: str) -> Callable[..., Any]:
-    def read(*files: Any, **options: Any) -> Any:
-        from gearmbs import flexible
-
-        return getattr(flexible, name)(*files, **options)
-
-    return read
-
-
-PROGRAMS: dict[str, Callable[..., Any]] = {
-    "abaqus": _reader("read_abaqus"),
-    "ansys": _reader("read_ansys"),
-    "box": _reader("box_model"),
-    "calculix": _reader("read_calculix"),
-    "mnf": _neutral_file,
-    "op2": _reader("read_op2"),
-    "op2 modes": _modes_of_op2,
-    "op4": _reader("read_op4"),
-}
-"""Readers of ``model`` by ``program``; "box" is a box by its walls, see `gearmbs.flexible.box_model`."""
-
-
-def housing_source(given: Any) -> Any:
-    """Return the finite-element model or the body with modes that was given, or that a table says how to read.
-
-    Raises
-    ------
-    DrivetrainError
-        For other objects, and unknown programs.
-    """
-    from gearmbs.flexible import FiniteElementModel, ModalModel
-
-    if isinstance(given, FiniteElementModel | ModalModel):
-        return given
-    require(
-        isinstance(given, Mapping),
-        f"{given!r} is no finite-element model; give one of gearmbs.flexible, or a table with program and files",
-    )
-    table = dict(given)
-    read = chosen(PROGRAMS, str(table.pop("program", "missing")), "", DrivetrainError, "program")
-    files = table.pop("files", ())
-    return read(*((files,) if isinstance(files, str | Path) else files), **table)

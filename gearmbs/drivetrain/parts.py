@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
+from gearmbs.drivetrain.members.wheel import IN_SHAFT, FlexibleWheel
 from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, require
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.mesh import ContactLaw, FlankFriction
@@ -37,6 +39,14 @@ class Wheel(Part):
     angle : float or str, optional
         Assembly angle of tooth 0 against the shaft's x axis, rad; default 0, or what a mesh's ``phase`` or a closed
         chain asks for.
+    body : FlexibleWheel, mapping or "shaft", optional
+        How it deforms between its teeth and its shaft: by a thin web and rim or a model, as a table of the fields of
+        `gearmbs.drivetrain.FlexibleWheel`. "shaft": it is cut from its shaft, whose mass has that of the wheel.
+        Default: it is a rigid disc.
+
+    Raises
+    ------
+    DrivetrainError
     """
 
     title: ClassVar[str] = "wheel"
@@ -45,12 +55,28 @@ class Wheel(Part):
     gear: GearSpec
     station: Annotated[Quantity, Measure("length")] = None
     angle: Annotated[Quantity, Measure("angle")] = None
+    body: Any = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.gear.name == GearSpec.name:
             # messages about the pair then tell its wheels apart
             object.__setattr__(self, "gear", replace(self.gear, name=self.name))
+        with errors_named(self.label):
+            if self.flexible is not None:
+                self.flexible.check(self.gear)
+
+    @cached_property
+    def flexible(self) -> FlexibleWheel | None:
+        """How its body deforms; None if it is rigid."""
+        return None if self.body in (None, IN_SHAFT) else FlexibleWheel.of(self.body)
+
+    @cached_property
+    def weight(self) -> tuple[float, tuple[float, float, float]]:
+        """Mass (kg) and moments of inertia about x, y and z through mid-face (kg m^2); zero if it is of its shaft."""
+        if self.flexible is not None:
+            return self.flexible.weight(self.gear)
+        return (0.0, (0.0, 0.0, 0.0)) if self.body == IN_SHAFT else (self.gear.mass, self.gear.inertia)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -126,7 +126,7 @@ class PlanetaryStage(Part):
     def carrier_apart(self, train: Drivetrain) -> bool:
         """Return whether the carrier is a body of its own: it deforms, or is on a shaft that bends."""
         on = train.parts.get(self.carrier)
-        return self.carrier_body is not None or (isinstance(on, Shaft) and on.modes is not None)
+        return self.carrier_body is not None or (isinstance(on, Shaft) and on.bends)
 
     @cached_property
     def on_pins(self) -> Support | PinBearing | None:
@@ -316,10 +316,14 @@ class Carried(NamedTuple):
 
 
 def carried(train: Drivetrain, shaft: str) -> list[Carried]:
+    """Return the masses that a shaft has of what stands on it: not of wheels that deform, which are bodies."""
+    own = {wheel.name for wheel in train.wheels if wheel.body is not None}
+    return [one for one in standing(train, shaft) if one.name not in own]
+
+
+def standing(train: Drivetrain, shaft: str) -> list[Carried]:
     """Return what stands on a shaft: wheels, and members of planetary stages."""
-    out = [
-        Carried(w.name, train.station(w), w.gear.mass, tuple(w.gear.inertia)) for w in train.wheels if w.shaft == shaft
-    ]
+    out = [Carried(w.name, train.station(w), w.weight[0], w.weight[1]) for w in train.wheels if w.shaft == shaft]
     for stage in train.planetary_stages:
         for member, on in stage.holders.items():
             # a carrier that deforms, or on a shaft that bends, is a body of its own
@@ -358,7 +362,7 @@ def check_stage(train: Drivetrain, stage: PlanetaryStage) -> None:
             "inertia, and leave it out here",
         )
         require(
-            member == "ring" or getattr(part, "model", None) is None,
+            member == "ring" or isinstance(part, Shaft) or part.model is None,
             f"{stage.label}: {member} is on {part.label}, a model of finite elements or modes, which has a seat for a "
             "ring only; give 'ground', a rigid housing, or a shaft in that housing",
         )

@@ -13,6 +13,7 @@ from gearmbs.drivetrain.drives import Drive, SpeedDrive, TorqueDrive
 from gearmbs.drivetrain.loads import Load, TorqueLoad
 from gearmbs.drivetrain.part import DrivetrainError
 from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, TorqueSensor
+from gearmbs.drivetrain.planetary import standing
 from gearmbs.drivetrain.shaft import Shaft
 from gearmbs.gears.mesh import FlankFriction
 from gearmbs.mechanism.parts.functions import as_function, constant
@@ -105,6 +106,10 @@ def _turn(train: Drivetrain, m: Mechanism, share: float, time: float) -> None:
     """Let the bodies of a mechanism turn at a part of their operating speeds, from where they are at a time, s."""
     for name, speed in train.speeds.items():
         _spin(m.bodies[name], share * speed)
+        # what stands on it as a body of its own
+        for one in standing(train, name):
+            if one.name in m.bodies:
+                _spin(m.bodies[one.name], share * speed)
     for stage in train.planetary_stages:
         speeds = stage.speeds(train)
         member, shaft = next(iter(stage.turning(train).items()))

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
-from gearmbs.drivetrain.part import Part, errors_named, require
-from gearmbs.flexible import ElasticMaterial, ShaftSection
+from gearmbs.drivetrain.members.shaft_body import cylinders_of, placed_model
+from gearmbs.drivetrain.members.sources import ALL, axes_of, body_source
+from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, require
+from gearmbs.flexible import ElasticMaterial, ModalModel, ShaftSection
 from gearmbs.flexible.shaft import ELEMENTS
+from gearmbs.schema.described import chosen
 from gearmbs.schema.quantities import Measure
 from gearmbs.units import Quantity, doubt_of_density
 from gearmbs.wording import warn
@@ -32,9 +36,6 @@ DAMPING: Damping = ((10e3, 0.01), (50e3, 0.1), (math.inf, 1.0))
 """Damping ratios of modes by bands of frequency, Hz: 1 % where teeth excite, as flexible bodies have where nothing is
 said, and more for shapes that carry loads at seats, whose frequencies would hold the step of an integrator down."""
 
-ALL = "all"
-"""Number of modes with which nothing of the finite elements is lost."""
-
 GAUSS = np.polynomial.legendre.leggauss(3)
 """Places and weights: exact to the fifth power, and moments of cones have the fourth."""
 
@@ -44,7 +45,7 @@ Three = tuple[Quantity, Quantity, Quantity]
 
 @dataclass(frozen=True, kw_only=True)
 class Shaft(Part):
-    """A shaft: a cylinder, sections one after the other, or a rotor given by its numbers; rigid unless it has modes.
+    """A shaft: a cylinder, sections, a finite-element model, or a rotor by its numbers; rigid unless it has modes.
 
     Stations are measured from its left end, along its axis.
 
@@ -73,13 +74,28 @@ class Shaft(Part):
     modes : int or "all", optional
         The shaft bends, twists and stretches: so many of its shapes between the places of its parts, the slowest, are
         kept beside the static ones by loads there; see `gearmbs.flexible.reduce_model`. Its wheels are rigid discs.
-        None: it is rigid.
+        None: it is rigid. With a ``model``: how many beside the static ones, default 20, of a body with modes all.
     damping : float, sequence or bands
         Of its modes, see `gearmbs.flexible.damping_ratios`.
     youngs_modulus, poisson_ratio : float or str
         Pa; of steel if they are not given.
     elements : int
         Least number of its finite elements; parts and changes of section begin new ones anyway.
+    model : FiniteElementModel, ModalModel or mapping, optional
+        Instead of a cylinder or sections: of `gearmbs.flexible`, or a table with ``program``, ``files`` and keywords of
+        its reader, as of a housing. Its parts are carried by the nodes at their stations: a wheel by those within its
+        face, a rolling bearing by those within its bore and width, anything else by those within an eighth of the
+        diameter there, or up to all of it where they are few.
+    at : sequence of 3 floats, optional
+        With a model: the origin of its nodes' frame in the shaft's, whose z is the axis from the left end, m;
+        default: on the axis, the leftmost nodes at station 0.
+    axes : sequence of 3 by 3 floats, optional
+        Columns: the axes of the nodes' frame in that of the shaft; default: the same.
+    seats : mapping of str, optional
+        With a model, by part: diameter and width within which nodes carry it, m. Of a body with modes: name of the
+        seat, or number of the node, else the one nearest to the station.
+    faces : {"average", "rigid"}
+        How nodes follow their seat, see `gearmbs.flexible.Interface`.
     wheels : mapping, optional
         What stands on it, by name: a pair of station and `gearmbs.gears.GearSpec`, or a table with the fields of
         `Wheel`. In a `Drivetrain` they are parts like others.
@@ -108,11 +124,19 @@ class Shaft(Part):
     youngs_modulus: Annotated[Quantity, Measure("pressure", above=0)] = 2.1e11
     poisson_ratio: Annotated[Quantity, Measure(low=0, below=0.5)] = 0.3
     elements: Annotated[int, Measure(low=1, whole=True, remedy="give a whole number from 1 up")] = ELEMENTS
+    model: Any = None
+    at: Annotated[Three | None, Measure("length", several=3)] = None
+    axes: Any = None
+    seats: Mapping[str, Any] | None = None
+    faces: str = "average"
     wheels: Mapping[str, Any] | None = None
     bearings: Mapping[str, Any] | None = None
+    told: Any = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.model is not None:
+            self._read_model()
         require(
             self.radius is None or self.diameter is None,
             f"{self.label}: radius is {self.radius} m and diameter {self.diameter} m; give one of them",
@@ -130,7 +154,7 @@ class Shaft(Part):
                 f"{self.label}: length is {self.length} m, its sections come to {whole:g} m; give length or sections",
             )
             object.__setattr__(self, "length", whole)
-        elif self.length is None:
+        elif self.length is None and self.model is None:
             object.__setattr__(self, "length", 0.2)
         doubt = doubt_of_density(self.density)
         largest = max(max(pair) for pair in self.cylinders)
@@ -142,6 +166,8 @@ class Shaft(Part):
 
     def changed_fields(self, fields: dict[str, Any]) -> dict[str, Any]:
         """Return fields to change with those that make room for them: new sections take the place of any length."""
+        if fields.get("model") is not None:
+            return {"length": None, "radius": None, "diameter": None, "sections": None, **fields}
         if fields.get("sections") is not None:
             return {"length": None, "radius": None, "diameter": None, **fields}
         room = {"sections": None} if fields.keys() & {"length", "radius", "diameter"} else {}
@@ -149,7 +175,49 @@ class Shaft(Part):
             room |= {other: None} if one in fields else {}
         return {**room, **fields}
 
+    def _read_model(self) -> None:
+        for name in ("radius", "diameter", "sections", "mass", "inertia"):
+            require(getattr(self, name) is None, f"{self.label}: {name} follows from model; leave it out")
+        if isinstance(self.model, Mapping):
+            # for a file
+            object.__setattr__(self, "told", dict(self.model))
+        object.__setattr__(self, "axes", axes_of(self.axes, self.label))
+        chosen(("average", "rigid"), self.faces, f"{self.label}: ", DrivetrainError, "faces")
+        with errors_named(f"{self.label}: model"):
+            object.__setattr__(self, "model", body_source(self.model))
+        with errors_named(self.label):
+            low, high = (
+                float(z) for z in (self.body_model.positions[:, 2].min(), self.body_model.positions[:, 2].max())
+            )
+        require(
+            abs(low) <= 1e-3 * (high - low),
+            f"{self.label}: nodes of its model reach from {1e3 * low:.6g} to {1e3 * high:.6g} mm along the axis, and "
+            "stations are from its left end, 0; change at, or leave it out",
+        )
+        require(
+            self.length is None or math.isclose(self.length, high, rel_tol=1e-6),
+            f"{self.label}: length is {self.length} m, that of its model {high:g} m; leave length out",
+        )
+        object.__setattr__(self, "length", high)
+
+    @property
+    def bends(self) -> bool:
+        """Whether it is a body with modes."""
+        return self.modes is not None or self.model is not None
+
+    @cached_property
+    def body_model(self) -> Any:
+        """Its finite elements, or its body with modes, in the frame of the shaft."""
+        return placed_model(self)
+
     def _check_modes(self) -> None:
+        for name in ("at", "axes"):
+            told = getattr(self, name) is not None and self.model is None
+            require(not told, f"{self.label}: {name} is given without model, whose nodes it places; leave it out")
+        require(
+            not (self.seats and self.model is None),
+            f"{self.label}: seats is given without model, whose nodes they are; leave it out",
+        )
         if self.modes is None:
             return
         counted = isinstance(self.modes, int) and not isinstance(self.modes, bool) and self.modes >= 1
@@ -209,6 +277,8 @@ class Shaft(Part):
     @property
     def cylinders(self) -> tuple[tuple[float, float], ...]:
         """Lengths and outer radii from left to right, m; a cone is some cylinders."""
+        if self.model is not None:
+            return cylinders_of(self.body_model.positions)
         out: list[tuple[float, float]] = []
         for one in self.pieces:
             count = 1 if one.outer == one.outer_end else CONE_PIECES
@@ -235,6 +305,11 @@ class Shaft(Part):
 
     def body(self) -> tuple[float, float, float, float]:
         """Return mass (kg), place of the centre of mass along the axis (m), moments along and across the axis."""
+        if self.model is not None:
+            model = self.body_model
+            found = model.properties if isinstance(model, ModalModel) else model.mass_properties()
+            x, y, polar = (float(value) for value in np.diag(found.inertia))
+            return float(found.mass), float(found.com[2]), polar, 0.5 * (x + y)
         m, moment, polar, across = 0.0, 0.0, 0.0, 0.0
         for z, inner, outer, weight in self._discs():
             area, second = math.pi * (outer**2 - inner**2), 0.25 * math.pi * (outer**4 - inner**4)

@@ -21,7 +21,7 @@ import scipy.linalg
 from gearmbs.drivetrain.couplings.aligned import is_rigid
 from gearmbs.drivetrain.drives import SpeedDrive
 from gearmbs.drivetrain.part import errors_named, require
-from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, carried
+from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, standing
 from gearmbs.gears.ideal_mesh import IdealMesh
 from gearmbs.gears.stiffness import pair_stiffness
 from gearmbs.kernels.jit import njit
@@ -409,7 +409,7 @@ def _inertias(train: Drivetrain, names: tuple[str, ...], place: dict[str, int]) 
     """Return the moments of inertia of all shafts with their wheels, and of planets, about their axes, kg m^2."""
     inertias = np.zeros(len(names))
     for shaft in train.shafts:
-        inertias[place[shaft.name]] += shaft.body()[2] + sum(c.inertia[2] for c in carried(train, shaft.name))
+        inertias[place[shaft.name]] += shaft.body()[2] + sum(c.inertia[2] for c in standing(train, shaft.name))
     for planet, stage in train.planets.items():
         mass, moments = stage.weights["planet"]
         inertias[place[planet]] += moments[2]

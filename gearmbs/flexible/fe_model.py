@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -252,6 +252,47 @@ class FiniteElementModel:
         elif speed < SLOW and density > HEAVY:
             out.append(f"it has {density:.3g} kg/m^3 or more, and waves run at {speed:.3g} m/s in it: {remedy}")
         return out
+
+    def placed(self, axes: np.ndarray, at: np.ndarray) -> FiniteElementModel:
+        """Return the model in another frame; what is known of it as of a beam, and of its stresses, is not kept.
+
+        Parameters
+        ----------
+        axes : ndarray, shape (3, 3)
+            Columns: the axes of its own frame in the other one.
+        at : ndarray, shape (3,)
+            Its own origin there, m.
+
+        Raises
+        ------
+        FlexibleError
+            If a node lacks a direction, with which the others would have to be mixed.
+        """
+        nodes = np.flatnonzero(self.dofs[:, 0] >= 0)
+        row_of = np.full((len(self.ids), 2, 3), -1)
+        row_of[self.dofs[nodes, 0], self.dofs[nodes, 1] // 3, self.dofs[nodes, 1] % 3] = nodes
+        whole, there = (row_of >= 0).all(axis=2), (row_of >= 0).any(axis=2)
+        if (whole != there).any():
+            node = self.ids[np.argmax((whole != there).any(axis=1))]
+            raise FlexibleError(
+                f"{self.name}: node {node} lacks a direction, so that the model cannot be turned; export all three "
+                "displacements of each node, or leave axes out"
+            )
+        three = row_of[whole]
+        others = np.flatnonzero(self.dofs[:, 0] < 0)
+        rows = np.concatenate([np.repeat(three, 3, axis=1).ravel(), others])
+        columns = np.concatenate([np.tile(three, 3).ravel(), others])
+        values = np.concatenate([np.tile(np.ravel(axes), len(three)), np.ones(others.size)])
+        turn = sp.csc_array((values, (rows, columns)), shape=self.stiffness.shape)
+        return replace(
+            self,
+            positions=self.positions @ np.transpose(axes) + at,
+            stiffness=turn @ self.stiffness @ turn.T,
+            mass=turn @ self.mass @ turn.T,
+            slices=None,
+            outline=None,
+            recovery=None,
+        )
 
     def field(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return displacements and rotations of the nodes for vectors of the degrees of freedom.

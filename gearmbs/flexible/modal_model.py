@@ -322,6 +322,36 @@ class ModalModel:
             )
         return self.selected(np.arange(kept))
 
+    def placed(self, axes: np.ndarray, at: np.ndarray) -> ModalModel:
+        """Return the body in another frame; its stresses and what is known of it as of a beam are not kept.
+
+        Parameters
+        ----------
+        axes : ndarray, shape (3, 3)
+            Columns: the axes of its own frame in the other one.
+        at : ndarray, shape (3,)
+            Its own origin there, m.
+        """
+        i, back = self.integrals, np.transpose(axes)
+        integrals = ShapeIntegrals(
+            i.mass, i.momentum @ back, i.angular_momentum @ back, i.cross @ back, axes @ i.first @ back,
+            axes @ i.second @ back,
+        )  # fmt: skip
+        both = np.kron(np.eye(2), axes)
+        seats = {
+            key: Seat(s.position @ back + at, s.moved @ back, s.turned @ back, s.turns,
+                      None if s.flexibility is None else both @ s.flexibility @ both.T)
+            for key, s in self.seats.items()
+        }  # fmt: skip
+        p = self.properties
+        return replace(
+            self, properties=MassProperties(p.mass, p.com @ back + at, axes @ p.inertia @ back), integrals=integrals,
+            positions=self.positions @ back + at, moved=self.moved @ back,
+            turned=None if self.turned is None else self.turned @ back, seats=seats,
+            inertias=None if self.inertias is None else axes @ self.inertias @ back,
+            line=False, outline=None, recovery=None,
+        )  # fmt: skip
+
     def participation(self, *, torques: bool = False) -> np.ndarray:
         """Return the share of each mode in the static compliance of the seats, shape (n,).
 

@@ -195,6 +195,7 @@ def reduce_model(
     preload: Any = None,
     spin_stiffness: Any = None,
     long_axis: int = 2,
+    relief: bool = False,
 ) -> ModalModel:
     """Return a modal body made of a finite-element model.
 
@@ -220,6 +221,8 @@ def reduce_model(
         Geometric stiffness by a spin of 1 rad/s across the long axis, N s^2/m; see :meth:`Shaft.spin_stiffness`.
     long_axis : int
         Which axis that is: 0, 1 or 2.
+    relief : bool
+        Whether responses of the held body to inertia are kept, too: loads at seats then deform it as the whole does.
 
     Raises
     ------
@@ -259,7 +262,7 @@ def reduce_model(
         basis = np.hstack([vibrating, attachment_modes(k, m, rigid, parts.constraints)])
     else:
         static = constraint_modes(held)
-        basis = np.hstack([static, vibrating])
+        basis = np.hstack([static, vibrating, *([held.scale * held.solve(m @ rigid)] if relief else [])])
     if basis.shape[1] == 0:
         raise FlexibleError(
             f"{model.name}: without interfaces there are no static shapes, and no mode of the free body is below "

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearmbs.drivetrain import DrivetrainError, Housing, Shaft
-from gearmbs.drivetrain.housing import MODES
-from gearmbs.flexible import ModalModel
+from gearmbs.drivetrain.members.sources import ALL, MODES
+from gearmbs.flexible import FiniteElementModel, ModalModel
 from gearmbs.studies.run.accuracy import FLOOR, asked_accuracy, per_cent
 from gearmbs.wording import warn
 
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain import Drivetrain
     from gearmbs.units import QuantityLike
 
-ALL = "all"
 HARMONICS = 3
 """Mesh harmonics up to which frequencies are judged by default: those of records."""
 ATTEMPTS = 3
@@ -126,7 +125,10 @@ def _finer(train: Drivetrain, modes: int, elements: int) -> Drivetrain | None:
     """Return a train with so many times the modes and elements, None if nothing of it is made of these."""
     changed = train
     for shaft in train.shafts:
-        if isinstance(shaft, Shaft) and shaft.modes is not None:
+        if isinstance(shaft, Shaft) and isinstance(shaft.model, FiniteElementModel):
+            if shaft.modes != ALL:
+                changed = changed.changed(shaft.name, modes=modes * (shaft.modes or MODES))
+        elif isinstance(shaft, Shaft) and shaft.model is None and shaft.modes is not None:
             more = ALL if shaft.modes == ALL else modes * shaft.modes
             changed = changed.changed(shaft.name, modes=more, elements=elements * shaft.elements)
     for housing in train.housings:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gearmbs.flexible import ModalModel
     from gearmbs.units import QuantityLike
 
-KINDS = ("mesh", "ring", "shaft", "carrier", "bearing", "coupling", "housing", "mount", "load", "other")
+KINDS = ("mesh", "ring", "wheel", "shaft", "carrier", "bearing", "coupling", "housing", "mount", "load", "other")
 """What parts are, in the order of tables; drives count as loads."""
 
 MOTIONS = ("bending", "torsion", "stretching")
@@ -133,6 +133,7 @@ def part_kinds(train: Drivetrain) -> dict[str, str]:
     out |= {mesh.name: "mesh" for mesh in train.meshings} | dict.fromkeys(train.pins, "bearing")
     out |= {seat_of(coupling): "coupling" for coupling in train.couplings}
     out |= {stage.carrier_name: "carrier" for stage in train.planetary_stages}
+    out |= {wheel.name: "wheel" for wheel in train.wheels if wheel.flexible is not None}
     out |= {ring_meshes_of(stage.name): "ring" for stage in train.planetary_stages if stage.rim is not None}
     return out | {mount.name: "mount" for housing in train.housings for mount in housing.mounts}
 
@@ -244,11 +245,14 @@ def _housing_of(train: Drivetrain, mount: str) -> str:
 
 def _motion(model: ModalModel, strain: np.ndarray) -> str:
     """Return how a shaft deforms most: round shafts bend, twist and stretch in modal coordinates of their own."""
-    assert model.turned is not None
     reach = float(np.abs(model.positions[:, 2]).max())
+    moved, turned = model.moved, model.turned
+    if turned is None:
+        # of solids the seats of its parts have rotations
+        moved, turned = (np.stack(one, axis=1) for one in zip(*((s.moved, s.turned) for s in model.seats.values())))
     sizes = np.column_stack([
-        np.abs(model.moved[:, :, :2]).max(axis=(1, 2)), reach * np.abs(model.turned[:, :, 2]).max(axis=1),
-        np.abs(model.moved[:, :, 2]).max(axis=1),
+        np.abs(moved[:, :, :2]).max(axis=(1, 2)), reach * np.abs(turned[:, :, 2]).max(axis=1),
+        np.abs(moved[:, :, 2]).max(axis=1),
     ])  # fmt: skip
     sums = np.bincount(np.argmax(sizes, axis=1), strain, minlength=3)
     return MOTIONS[int(np.argmax(sums))]

@@ -149,7 +149,9 @@ def _exact_part(part: Any) -> dict[str, Any]:
         found["pins"] = _pins(part, True)
         found["on pins"] = _exact(getattr(part.on_pins, "rolling", None))
         found["masses"] = _exact(part.weights)
-    elif isinstance(part, Housing) and part.told is not None:
+    elif isinstance(part, Wheel) and part.flexible is not None and part.flexible.model is None:
+        found["body"] = _exact(part.flexible)
+    elif isinstance(part, Housing | Shaft) and part.told is not None:
         found["model"] = _exact(part.told)
     elif isinstance(part, RollingContactBearing) and "defects" in part.settings:
         found["settings"] = _exact({**part.settings, "defects": as_defects(part.settings["defects"])})
@@ -206,18 +208,27 @@ def _part(part: Any, numbers: set[str]) -> dict[str, Any]:
             table |= _planetary(value, where, texts)
         elif isinstance(part, PlanetaryStage) and name == "pins":
             table[name] = _pins(part, texts)
-        elif isinstance(part, Housing) and name == "model":
+        elif name in ("body", "carrier_body") and _in_memory(value):
+            raise DrivetrainError(f"{where}: {IN_MEMORY}")
+        elif isinstance(part, Housing | Shaft) and name == "model":
             if part.told is None:
-                raise DrivetrainError(
-                    f"{where}: a model in memory has no form in a file; give the table of its program and files"
-                )
+                raise DrivetrainError(f"{where}: {IN_MEMORY}")
             table[name] = _form(part.told, where, texts)
         elif isinstance(part, Housing) and name in ("mounts", "modes") and isinstance(value, (list, tuple)):
             table[name] = _within(part, value, texts)
-        elif not (isinstance(part, Shaft) and name == "length" and part.sections is not None):
-            # of sections the length is their sum
+        elif not (isinstance(part, Shaft) and name == "length" and (part.sections or part.model) is not None):
+            # of sections the length is their sum, of a model its own
             table[name] = _form(value, where, texts)
     return table
+
+
+IN_MEMORY = "a model in memory has no form in a file; give the table of its program and files"
+
+
+def _in_memory(body: Any) -> bool:
+    """Return whether the body of a wheel or a carrier has a model that is in no file."""
+    model = body.get("model") if isinstance(body, Mapping) else getattr(body, "model", None)
+    return model is not None and not isinstance(model, Mapping)
 
 
 def _pins(stage: PlanetaryStage, texts: bool) -> Any:

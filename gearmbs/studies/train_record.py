@@ -14,9 +14,10 @@ import numpy as np
 import xarray as xr
 
 from gearmbs.dae.results.solution import Solution
-from gearmbs.drivetrain import Accelerometer, Drivetrain, Housing, Laser, Shaft, SpeedSensor, TorqueSensor
+from gearmbs.drivetrain import Accelerometer, Drivetrain, Housing, Laser, Shaft, SpeedSensor, TorqueSensor, Wheel
 from gearmbs.drivetrain.kinematics import RPM, KinematicTable, table_at
 from gearmbs.drivetrain.members.rim import rim_meshes, told_of_mesh
+from gearmbs.drivetrain.members.wheel import BORE
 from gearmbs.drivetrain.planetary import Meshing, PlanetaryStage, differentials
 from gearmbs.mechanism import Mechanism
 from gearmbs.signals.files.simulated import held_speed
@@ -178,7 +179,9 @@ class TrainRecorder:
             turned[:, k], speed[:, k] = self._rocks(part, stage)
         twisted = np.zeros((m, len(on_shafts(train))))
         for k, (wheel, shaft) in enumerate(on_shafts(train).items()):
-            if train.part(shaft, Shaft).modes is not None:
+            if wheel in self.mechanism.bodies:
+                twisted[:, k] = self._of_a_wheel(part, wheel, bends=train.part(shaft, Shaft).bends)
+            elif train.part(shaft, Shaft).bends:
                 twisted[:, k] = part.deflection(wheel)[1][:, 2]
         bodies = list(train.turning)
         for k, (pin, (stage, angle)) in enumerate(train.pins.items(), start=len(train.bearings)):
@@ -192,6 +195,16 @@ class TrainRecorder:
         for k, sensor in enumerate(train.sensors):
             sensors[:, k] = self._sensed(sensor, part, speed)
         return TrainColumns(part.t.copy(), contact, force, sensors, turned, speed, twisted)
+
+    def _of_a_wheel(self, part: Solution, wheel: str, *, bends: bool) -> np.ndarray:
+        """Return the angle of the teeth of a wheel that is a body of its own against its shaft, rad.
+
+        The bore is on the shaft, and turns as its seat there does.
+        """
+        turned = part.deflection(f"{wheel}.I")[1][:, 2] if bends else np.zeros(part.t.size)
+        if self.train.part(wheel, Wheel).flexible is not None:
+            turned = turned + (part.deflection(wheel)[1] - part.deflection(f"{wheel}.{BORE}")[1])[:, 2]
+        return turned
 
     def _rocks(self, part: Solution, stage: PlanetaryStage) -> tuple[np.ndarray, np.ndarray]:
         """Return angle (rad) and speed (rad/s) about the axis of what holds a member of a stage, its seat included."""
@@ -241,7 +254,7 @@ class TrainRecorder:
     def _deforms(self, sensor: object) -> bool:
         """Return whether what a sensor looks at bends by shapes that its body knows."""
         if isinstance(sensor, Laser):
-            return self.train.part(sensor.shaft, Shaft).modes is not None
+            return self.train.part(sensor.shaft, Shaft).bends
         if isinstance(sensor, Accelerometer):
             bearing = next(b for b in self.train.bearings if b.name == sensor.bearing)
             return self.train.part(self.train.carrier(bearing), Housing).model is not None

@@ -215,7 +215,12 @@ def train_shapes(train: Drivetrain) -> dict[str, Mesh]:
             pieces.append(cylinder(radius, length, 48).placed(np.array([0.0, 0.0, z + 0.5 * length]), np.eye(3)))
             z += length
         for wheel in train.wheels:
-            if wheel.shaft == shaft.name and wheel.name in wheels:
+            if wheel.shaft != shaft.name or wheel.name not in wheels:
+                continue
+            if wheel.flexible is not None or (shaft.model is not None and wheel.body is None):
+                # a body of its own
+                out[wheel.name] = wheels[wheel.name]
+            else:
                 place = np.array([0.0, 0.0, train.station(wheel)])
                 pieces.append(wheels[wheel.name].placed(place, turn_z(train.layout.wheels[wheel.name])))
         out[shaft.name] = joined(pieces)
@@ -255,6 +260,7 @@ def train_scene(train: Drivetrain) -> Scene:
     scene = mechanism_scene(mechanism, shapes=train_shapes(train), through=housings, title=train.name)
     colours = dict.fromkeys(train.planets, PART_COLOURS["planet"])
     colours |= {shaft.name: COLOURS[k % len(COLOURS)] for k, shaft in enumerate(train.shafts)}
+    colours |= {wheel.name: colours[wheel.shaft] for wheel in train.wheels}
     scene.parts = [replace(part, colour=colours.get(part.name, part.colour)) for part in scene.parts]
     for stage in train.planetary_stages:
         # the solids of a ring that is held are on no body of their own

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from gearmbs.drivetrain.housing import MODES, housing_source
+from gearmbs.drivetrain.members.sources import ALL, MODES, ROUND, body_source
 from gearmbs.drivetrain.part import errors_named
-from gearmbs.drivetrain.shaft import ALL, DAMPING, Shaft, damping_of
+from gearmbs.drivetrain.shaft import DAMPING, Shaft, damping_of
 from gearmbs.flexible import FiniteElementModel, Interface, ModalModel, Seat, reduce_model
 from gearmbs.flexible.modal_model import shapes_at
 from gearmbs.gears.geometry import MM, turn_z
@@ -41,8 +41,6 @@ PIN_SHARE = 0.05
 flanges around it."""
 PIN_SIZE = 0.1
 """Radius of gyration of a pin, by that of the circle of pins: it only keeps its own tilting above all else."""
-ROUND = 1.02
-"""Radius within which nodes are in a seat, over that of the bore: what a mesh rounds of the circle they are on."""
 
 Stiffness = Annotated[Quantity, Measure("stiffness", above=0)]
 Sizes = Measure("length", above=0, several=2)
@@ -131,7 +129,7 @@ class FlexibleCarrier(Described):
         else:
             _need(not told, f"carrier_body: {', '.join(told)} beside model; give one of them")
             with _named("model"):
-                object.__setattr__(self, "model", housing_source(self.model))
+                object.__setattr__(self, "model", body_source(self.model))
         counted = isinstance(self.modes, int) and not isinstance(self.modes, bool) and self.modes >= 1
         _need(
             counted or self.modes in (None, ALL),
@@ -349,7 +347,7 @@ def add_carrier(
     name, flexible = stage.carrier_name, stage.flexible_carrier
     if flexible is None:
         shaft = train.parts.get(stage.carrier)
-        if not (isinstance(shaft, Shaft) and shaft.modes is not None):
+        if not (isinstance(shaft, Shaft) and shaft.bends):
             return on
         hub = origin
         body: Body = m.body(
