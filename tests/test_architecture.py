@@ -108,8 +108,8 @@ CIRCLES = {
         "properties of Bearing, and the functions that carry them out",
     ("drivetrain.bodies", "drivetrain.build", "drivetrain.description", "drivetrain.drivetrain",
      "drivetrain.kinematics", "drivetrain.members.carrier", "drivetrain.on_shafts", "drivetrain.placement",
-     "drivetrain.planetary", "drivetrain.plants", "drivetrain.static.flow", "drivetrain.static.holding",
-     "drivetrain.static.rest", "drivetrain.torsional"):
+     "drivetrain.planetary", "drivetrain.plants", "drivetrain.static.doubts", "drivetrain.static.flow",
+     "drivetrain.static.holding", "drivetrain.static.rest", "drivetrain.torsional"):
         "methods of Drivetrain, and the functions that carry them out",
     ("mechanism.compile", "mechanism.lumping", "mechanism.checks", "mechanism.forces.friction",
      "mechanism.mechanism", "mechanism.solve.analyses", "mechanism.solve.measures", "mechanism.solve.plant_names",

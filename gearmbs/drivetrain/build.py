@@ -24,6 +24,7 @@ from gearmbs.drivetrain.parts import Accelerometer, Laser, Sensor, SpeedSensor, 
 from gearmbs.drivetrain.placement import Layout, Seat, order, seats
 from gearmbs.drivetrain.planetary import PlanetaryStage, add_stage, carried, check_stage
 from gearmbs.drivetrain.shaft import Shaft
+from gearmbs.drivetrain.static.doubts import size_hint
 from gearmbs.drivetrain.static.holding import check_held, check_stands
 from gearmbs.gears.geometry import MM, turn_z
 from gearmbs.gears.spec import COUNTED_TWICE, GearSpec
@@ -196,7 +197,7 @@ def _wheel_and_shaft(train: Drivetrain, wheel: Wheel, shaft: Shaft, places: dict
             raise DrivetrainError(
                 f"{wheel.label}: it runs through shaft '{shaft.name}': the axes are {MM * distance:.6g} mm apart, its "
                 f"tip radius {MM * wheel.gear.tip_radius:.6g} mm and the shaft's radius {MM * radius:.6g} mm; make the "
-                "shaft shorter or thinner, or turn the direction of a mesh"
+                f"shaft shorter or thinner, or turn the direction of a mesh{size_hint(train, shaft.name)}"
             )
         start += length
 

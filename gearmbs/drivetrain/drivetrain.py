@@ -379,12 +379,15 @@ class Drivetrain(Guessed):
         UserWarning
             Of drives that cannot carry the loads, of loads by points whose curve leaves them by far or is asked beyond
             them, of torques on shafts whose speed is prescribed, of torques of a running train that do not begin
-            together, and of shafts that are counted twice in wheels without a bore.
+            together, of shafts that are counted twice in wheels without a bore, of sizes that do not fit each other,
+            and of numbers whose units were hardly meant.
         """
         from gearmbs.drivetrain.build import build
         from gearmbs.drivetrain.kinematics import warn_of_lost_torques, warn_of_tables, warn_of_weak_drives
         from gearmbs.drivetrain.loads import warn_of_drift
+        from gearmbs.drivetrain.static.doubts import warn_of_doubts
 
+        warn_of_doubts(self)
         warn_of_tables(self)
         if self.running:
             warn_of_drift(self.drives, self.loads, self.run_up)
