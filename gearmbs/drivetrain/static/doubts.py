@@ -1,12 +1,7 @@
 """What speaks against the numbers of a drivetrain: sizes that do not fit each other, and units that were hardly meant.
 
 A model can have all of it, so that it is warned of and not refused. Most is a radius where a diameter was meant, or a
-plain number, which is in SI.
-
-References
-----------
-.. [1] J. Brändlein, P. Eschmann, L. Hasbargen, K. Weigand, Ball and Roller Bearings, 3rd ed., Wiley, 1999: shoulders,
-   adapter sleeves, speeds.
+plain number, which is in SI. Limits are wide of what is usual: they are no rules of design, and from no standard.
 """
 
 from __future__ import annotations
@@ -28,9 +23,9 @@ if TYPE_CHECKING:
     from gearmbs.drivetrain.placement import Seat
 
 SHOULDER = 1.4
-"""Largest diameter of a shaft in a bearing by the bearing's bore: shoulders of inner rings reach 1.35 of it [1]_."""
+"""Largest diameter of a shaft in a bearing by the bearing's bore: shoulders of inner rings reach 1.35 of it."""
 SLEEVE = 1.25
-"""Largest bore of a bearing by the diameter of its shaft: adapter sleeves of small bearings take up a fifth [1]_."""
+"""Largest bore of a bearing by the diameter of its shaft: adapter sleeves of small bearings take up a fifth."""
 HALF = (0.45, 0.55)
 """Ratio of sizes that looks like a radius and a diameter."""
 LOOSE = 1.5
@@ -39,7 +34,7 @@ that the sections of a shaft leave out are a quarter of it thick."""
 OVERHANG = 0.25
 """Part of a wheel's face that may be over the end of its shaft: half of it is where its middle is at the end."""
 PITCH_SPEED = 2.5e6
-"""Largest speed times mean diameter of a rolling bearing, mm/min: engines of aircraft reach 2.4e6 [1]_."""
+"""Largest speed times mean diameter of a rolling bearing, mm/min: engines of aircraft reach 2.4e6."""
 HEAVY = 20.0
 """Largest weight of a mass, m/s^2: twice that on the ground."""
 SLOWEST = 1.0
@@ -47,8 +42,8 @@ SLOWEST = 1.0
 UNEVEN = 1e-3
 """Least stiffness of a mount by the stiffest, in one direction, unless it has none."""
 WIDE = 3.0
-"""Largest ratio of the face widths of two wheels in mesh, and of a face width to the pitch diameter of its pinion:
-ISO 6336 limits the latter to 2."""
+"""Largest ratio of the face widths of two wheels in mesh, and of a face width to the pitch diameter of its pinion,
+of which 1 is much."""
 THIN = 1.0
 """Least face width by the module: below a tooth is higher than wide."""
 PLAY = 0.5
