@@ -98,11 +98,13 @@ def test_processes_and_threads_find_late_kernels_for_themselves(program, tmp_pat
     assert run(program, package.environment) == ""
 
 
+@pytest.mark.slow
 def test_the_pair_of_the_paper_runs_without_numba():
     # whatever is not on disk yet is compiled by the first
     assert run(PAIR) == "\n" or run(PAIR) == "\n"
 
 
+@pytest.mark.slow
 def test_numba_comes_with_functions_of_a_user():
     rotation_matrix.ready()
     run(THEN_NUMBA)
