@@ -152,7 +152,7 @@ def row_order(mechanism: Mechanism) -> np.ndarray | None:
     if mechanism.redundancy == "declared":
         return None
     ranks = [_rank(joint, row) for joint in mechanism.joints.values() for row in joint.rows]
-    ranks += [COUPLING] * len(mechanism.constraints)
+    ranks += [COUPLING for constraint in mechanism.constraints.values() for _ in constraint.rows]
     within = [-k if rank == MOTION else k for k, rank in enumerate(ranks)]
     return np.lexsort((within, ranks))
 

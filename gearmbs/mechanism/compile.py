@@ -23,6 +23,7 @@ from gearmbs.mechanism.language.syntax import NamedNumber, Scope
 from gearmbs.mechanism.parts import elements as el
 from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Marker
+from gearmbs.mechanism.parts.constraint_laws import GeneralConstraint
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, Load, State
 from gearmbs.mechanism.parts.functions import TimeFunction
 from gearmbs.mechanism.parts.inputs import COEFFICIENTS, Input, Parameter, is_multiple, unit_factor
@@ -100,15 +101,8 @@ class _Compiler:
         rows = [row for joint in m.joints.values() for row in joint.rows]
         self.builder.add_rows([self.packed_row(row, label) for row, label in zip(rows, labels)])
         self.row_names += labels
-        for name, text in m.constraints.items():
-            tape = self.tape(text, f"general constraint '{name}'", "number")
-            if not tape.second_order:
-                raise ModelError(
-                    f"general constraint '{name}': {text!r} must depend on positions and TIME only; "
-                    "velocities and forces cannot enter a constraint"
-                )
-            self.builder.add_tape_row(self.add_tape(tape, f"{name}: expression"))
-            self.row_names.append(f"{name}: expression")
+        for name, constraint in m.constraints.items():
+            self.add_constraint(name, constraint)
         # the states given by expressions come first among the unknowns; their tapes are added with all else known
         self.builder.states = [(_state_kind(state), -1) for state in m.states.values()]
         for element in m.elements.values():
@@ -201,6 +195,20 @@ class _Compiler:
             packed.append((t.kind, index[id(t.i)], index[id(t.j)], t.axes, rotation, t.coefficient, start))
         return packed, function
 
+    def add_constraint(self, name: str, constraint: GeneralConstraint) -> None:
+        """Add the rows of a constraint by expressions."""
+        about = None if constraint.about is None else self.index(constraint.about)
+        for label, text in constraint.rows.items():
+            tape = self.tape(text, f"general constraint '{name}'", "number")
+            if not tape.second_order:
+                raise ModelError(
+                    f"general constraint '{name}': {text!r} must depend on positions and TIME only; "
+                    "velocities and forces cannot enter a constraint"
+                )
+            row = f"{name}: {label}"
+            self.builder.add_tape_row(self.add_tape(tape, row, about))
+            self.row_names.append(row)
+
     def function(self, function: TimeFunction, label: str, row: str | None = None) -> int:
         """Add a function of time; ``row`` is the constraint that it is prescribed for, if it is one."""
         if not function.is_expression:
@@ -222,9 +230,12 @@ class _Compiler:
 
     # --- expressions --------------------------------------------------------------------------------
 
-    def add_tape(self, tape: Tape, row: str | None = None) -> int:
-        """Add a tape; its counted angles start where the mechanism says. ``row`` is the constraint it is part of."""
-        number = self.builder.add_tape(tape)
+    def add_tape(self, tape: Tape, row: str | None = None, about: int | None = None) -> int:
+        """Add a tape; its counted angles start where the mechanism says.
+
+        ``row`` is the constraint it is part of, ``about`` the marker about which its reaction is told.
+        """
+        number = self.builder.add_tape(tape, about)
         for name, place, size in tape.numbers:
             at = self.builder.tape_rows[-1][T.TAPE_R] + place
             bent = not is_multiple(tape.text, name)
@@ -335,7 +346,7 @@ class _Compiler:
         counts = Counts(
             angles=tuple(kind.angles for kind in self.builder.kinds[1:]),
             modes=tuple(self.builder.modes[1:]),
-            rows=sum(len(j.rows) for j in m.joints.values()) + len(m.constraints),
+            rows=sum(len(j.rows) for j in m.joints.values()) + sum(len(c.rows) for c in m.constraints.values()),
             forces=sum(e.wrenches * e.has_force for e in m.elements.values()) + len(self.measured),
             torques=sum(e.wrenches * e.has_torque for e in m.elements.values()) + len(self.measured),
             states=len(m.every_state),

@@ -308,7 +308,12 @@ class _Lumping:
             for name, joint in old.joints.items()
             if name not in inside
         }
-        new.constraints = {n: text for n, text in old.constraints.items() if f"{n}: expression" in kept}
+        new.constraints = {}
+        for name, constraint in old.constraints.items():
+            rows = {label: text for label, text in constraint.rows.items() if f"{name}: {label}" in kept}
+            if rows:
+                about = None if constraint.about is None else self.markers[id(constraint.about)]
+                new.constraints[name] = replace(constraint, rows=rows, about=about)
         new.elements = {name: self._element(element, new.joints) for name, element in old.elements.items()}
         return new
 

@@ -19,6 +19,7 @@ from gearmbs.mechanism.language.user_functions import UserFunction
 from gearmbs.mechanism.load_methods import LoadMethods
 from gearmbs.mechanism.parts import joints as jt
 from gearmbs.mechanism.parts.bodies import Body, Marker, OwnAttributes, make_body
+from gearmbs.mechanism.parts.constraint_laws import ConstraintMethods, GeneralConstraint
 from gearmbs.mechanism.parts.elements import ForceElement, Load, State, Torque
 from gearmbs.mechanism.parts.functions import TimeFunction, as_function
 from gearmbs.mechanism.parts.inputs import Input, Output, Parameter
@@ -49,7 +50,7 @@ class ContactPair(Protocol):
         ...
 
 
-class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
+class Mechanism(JointMethods, ConstraintMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
     """A system of bodies, rigid or with modes of deformation, joints, motions and forces.
 
     Every part has a name. Joints take two bodies with a point and an axis in global components at the
@@ -118,7 +119,7 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         self.bodies: dict[str, Body] = {}
         self.joints: dict[str, jt.Joint] = {}
         self.elements: dict[str, Any] = {}
-        self.constraints: dict[str, str] = {}
+        self.constraints: dict[str, GeneralConstraint] = {}
         self.variables: dict[Any, str] = {}
         self.states: dict[Any, State] = {}
         self.splines: dict[Any, SplineData] = {}
@@ -454,38 +455,6 @@ class Mechanism(JointMethods, LoadMethods, ValueMethods, Shown, OwnAttributes):
         if self.joints.get(getattr(joint, "name", "")) is not joint:
             raise ModelError(f"friction '{name}': {joint!r} is not a joint of mechanism '{self.name}'")
         return add_friction(self, name, joint, friction_of(name, mu_static, mu_dynamic, {**parameters}, self.units))
-
-    def general_constraint(self, name: str, expression: str) -> None:
-        """Demand that an expression of positions and time vanish (ADAMS's GCON).
-
-        `Solution.reaction` tells what it exerts on the body of the first marker that the expression names, about that
-        marker's origin. Derivatives of motions and reactions by the parameters in it are exact.
-
-        Parameters
-        ----------
-        name : str
-        expression : str
-            In the function language, of displacements of markers, angles, parameters, functions and TIME, in the
-            mechanism's units.
-
-        Raises
-        ------
-        ModelError
-            For a name that is in use; when the mechanism is compiled for an expression that cannot be read, or that
-            asks for velocities, forces or states.
-
-        Examples
-        --------
-        >>> from gearmbs.mechanism import Mechanism
-        >>> m = Mechanism("bead")
-        >>> bead = m.body("bead", mass=2.0, inertia=(1e-3, 1e-3, 1e-3), position=(0.3, 0, 0), velocity=(0, 1, 0))
-        >>> place, centre = bead.marker(name="I"), m.ground.marker(name="G")
-        >>> m.general_constraint("hoop", "DX(I,G)**2 + DY(I,G)**2 - 0.3**2")
-        >>> print(m.simulate(0.1).reaction("hoop")[0][0].round(2) + 0.0)
-        [-6.67  0.    0.  ]
-        """
-        self._check_name(name)
-        self.constraints[name] = str(expression)
 
     @property
     def every_state(self) -> list[State]:

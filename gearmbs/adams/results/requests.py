@@ -267,7 +267,8 @@ class RequestEvaluator:
             return np.zeros((m, 6))
         lam = self.solution.multipliers[:, rows[0]]
         # the constraint is the mechanism's, in its own names
-        tape = compile_expression(self.model.mechanism.constraints[name], scope_of(self.model.mechanism)[0])
+        (text,) = self.model.mechanism.constraints[name].rows.values()
+        tape = compile_expression(text, scope_of(self.model.mechanism)[0])
         grad = np.zeros((m, tape.gradient_size))
         _gradient_series(
             tape.ints, tape.floats, self.solution.t, self.kin, self.marker_body, self.marker_frame, np.zeros(1),

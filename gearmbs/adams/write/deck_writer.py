@@ -184,8 +184,9 @@ class DeckNames:
     def _kinds(self) -> Iterable[tuple[str, str]]:
         for name, joint in self.mechanism.joints.items():
             yield name, joint_statement(joint).lower()
-        for name in self.mechanism.constraints:
-            yield name, "gcon"
+        for own, constraint in self.mechanism.constraints.items():
+            for name in constraint.named(own):
+                yield name, "gcon"
         for name, element in self.mechanism.elements.items():
             solid = isinstance(element, SolidContact) or (self.gears == "solids" and is_gear_contact(element))
             statement = load_statement(as_expressions(element, self.units)).lower()
@@ -202,6 +203,8 @@ class DeckNames:
                 )
             if call.name in ("MODAL", "MODAL1"):
                 raise ModelError(f"{shown(text)}: ADAMS has no function {call.name}; use markers at nodes instead")
+            if call.name == "COSINE":
+                raise ModelError(f"{shown(text)}: ADAMS has no function COSINE; use displacements and angles instead")
             call = replace(call, args=tuple(self._argument(call, k, a) for k, a in enumerate(call.args)))
             return self._element_call(call) if call.name in ELEMENT_FORCES else call
 

@@ -148,7 +148,7 @@ def _used_elsewhere(mechanism: Mechanism, name: str, load: Load) -> bool:
     keys = {key.upper() for key in _parameters(load)["keys"]}
     texts = [str(text) for key, text in mechanism.variables.items() if str(key).upper() not in keys]
     texts += [state.expression for key, state in mechanism.states.items() if str(key).upper() not in keys]
-    texts += mechanism.constraints.values()
+    texts += [text for constraint in mechanism.constraints.values() for text in constraint.rows.values()]
     for other, element in mechanism.elements.items():
         if other != name and isinstance(element, Load):
             texts += [text for text in element.expressions if text]
@@ -284,8 +284,9 @@ def constraint_statements(w: WriterContext) -> None:
             a, b = w.markers[id(joint.i)], w.markers[id(joint.j)]
             text = f"DM({a}, {b}) - {number(length.parameters[0] / w.units.length)}"
             w.statement(head, [i, f"FUNCTION = {text}"], name)
-    for name, text in w.mechanism.constraints.items():
-        w.statement(f"GCON/{w.elements['gcon', name]}", [f"FUNCTION = {w.expression(text)}"], name)
+    for own, constraint in w.mechanism.constraints.items():
+        for name, text in constraint.named(own).items():
+            w.statement(f"GCON/{w.elements['gcon', name]}", [f"FUNCTION = {w.expression(text)}"], name)
 
 
 def _joint_type(w: WriterContext, joint: Joint) -> list[str]:

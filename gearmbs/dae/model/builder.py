@@ -141,11 +141,14 @@ class TableBuilder:
                 self.coef.append(coefficient)
                 self.reference.append(start)
 
-    def add_tape(self, tape: Any) -> int:
-        """Add an expression, a `Tape` whose unknowns are bound to indices of y; return its number."""
+    def add_tape(self, tape: Any, about: int | None = None) -> int:
+        """Add an expression, a `Tape` whose unknowns are bound to indices of y; return its number.
+
+        Of a constraint ``about`` is the marker about which its reaction is told, by default the first in the tape.
+        """
         bodies = len(self.extra_i)
         unknowns = tape.ints[tape.ints[HEAD_ALGEBRAIC_LIST] :][: len(tape.algebraic)]
-        self.extra_i.extend([*tape.bodies, *(int(k) for k in unknowns), tape.first_marker])
+        self.extra_i.extend([*tape.bodies, *(int(k) for k in unknowns), tape.first_marker if about is None else about])
         i = len(self.extra_i)
         self.extra_i.extend(int(v) for v in tape.ints)
         r = len(self.extra_r)

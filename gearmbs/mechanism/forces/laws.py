@@ -11,7 +11,6 @@ import ast
 import inspect
 import itertools
 import linecache
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,8 +22,8 @@ from gearmbs.dae.equations.loads.traced import Frame
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels import PLAIN, derive
 from gearmbs.kernels.derive import ONE, ZERO, Function, Value, derivative, inputs, product, tangent
+from gearmbs.mechanism.parts.constraint_laws import tracing
 
-_tracing = threading.Lock()
 _numbers = itertools.count()
 AWAY = (1e-3, 1e-2, 0.1, 1.0)
 """Distances, of that between the markers or of 1 m where there is none, and angles, by which a pose is moved."""
@@ -201,7 +200,7 @@ def derive_law(
                 f"{label}: a law takes its states by name, and '{state}' is "
                 f"{'the time' if state == 't' else 'none of Python'}; give the state another name"
             )
-    with _tracing:
+    with tracing:
         derive.start()
         try:
             texts = _traced(label, law, markers, list(numbers), list(states), algebraic, start, numbers)

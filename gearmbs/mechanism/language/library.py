@@ -314,6 +314,12 @@ def _modal(rate: bool, low: Lowering, call: Call) -> int:
     return low.scaled(found, "rate") if rate else found
 
 
+def _cosine(low: Lowering, call: Call) -> int:
+    """COSINE(i, a, j, b): of the angle between axis a of marker i and axis b of marker j, 1 to 3; none of ADAMS."""
+    i, a = low.marker(call, 0), low.literal(call, 1, 1, 3) - 1
+    return low.builder.cosine(i, a, low.marker(call, 2), low.literal(call, 3, 1, 3) - 1)
+
+
 def _array(low: Lowering, call: Call) -> int:
     ref = low.ref(call.args[0])
     if ref not in low.scope.arrays:
@@ -363,6 +369,7 @@ def _table() -> dict[str, Function]:
     functions |= {
         "VR": (_radial_velocity, 1, 3),
         "ORIENT": (_orient, 3, 4),
+        "COSINE": (_cosine, 4, 4),
         "INCANG": (_included_angle, 3, 3),
         "IMPACT": (_impact, 7, 7),
         "BISTOP": (_bistop, 8, 8),

@@ -21,6 +21,7 @@ from gearmbs.mechanism.parts.quantities import Vector, frame_along, keeps_given,
 from gearmbs.units import QuantityLike
 
 if TYPE_CHECKING:
+    from gearmbs.mechanism.parts.constraint_laws import GeneralConstraint
     from gearmbs.mechanism.parts.elements import ForceElement, Load
 
 X, Y, Z = 0, 1, 2
@@ -241,7 +242,7 @@ class JointMethods:
     bodies: dict[str, Body]
     joints: dict[str, Joint]
     elements: dict[str, ForceElement | Load]
-    constraints: dict[str, str]
+    constraints: dict[str, GeneralConstraint]
     _take_inputs: Callable[..., None]
 
     @keeps_given

@@ -28,6 +28,16 @@ def random_marker(body, rng):
     return body.marker(rng.standard_normal(3), rng.random(3) + 0.5)
 
 
+def bent_screw(i, j, g, t, pitch):
+    """Two rows of all that a law may see."""
+    x, y, z = i.position(j)
+    turned = i.orientation(j) @ g.axes[:, 1]
+    return {
+        "advance": z - pitch * i.angle(j) + 0.1 * np.maximum(x, y) ** 3,
+        "across": i.origin @ turned - np.sin(2.0 * t) * np.exp(0.1 * j.distance(g)),
+    }
+
+
 def build(kind: str) -> Mechanism:
     rng = np.random.default_rng(RNG)
     m, one, two = two_bodies(rng)
@@ -50,6 +60,8 @@ def build(kind: str) -> Mechanism:
         m.torque("joint", i, harmonic(5.0, 2.0, 0.3), axis=(1, 2, 3), reaction=two)
     elif kind == "general constraint":
         m.general_constraint("joint", f'DX("{i.name}","{j.name}","{j.name}")*DM("{i.name}") - SIN(3*TIME)')
+    elif kind == "law of a constraint":
+        m.general_constraint("joint", bent_screw, i, j, random_marker(m.ground, rng), parameters={"pitch": 0.3})
     elif kind == "line force":
         m.line_force("joint", i, j, f'-50*(DM("{i.name}","{j.name}")-1)**3 - 2*VR("{i.name}","{j.name}")')
     elif kind == "axis force":
@@ -112,7 +124,16 @@ FRICTIONS = [
     for k in ("revolute", "translational", "cylindrical", "spherical", "universal")
     for by in ("", " by speed")
 ]
-OTHERS = ["screw", "distance", "rotation", "translation", "coupler", "torque", "grounded revolute"]
+OTHERS = [
+    "law of a constraint",
+    "screw",
+    "distance",
+    "rotation",
+    "translation",
+    "coupler",
+    "torque",
+    "grounded revolute",
+]
 KINDS = [*JOINTS, *LOADS, *REACTIONS, *FRICTIONS, *OTHERS]
 
 
