@@ -387,7 +387,7 @@ class _Builder:
 
     def _apart(self, wheel: Wheel, place: Marker, angular_velocity: np.ndarray) -> Marker:
         """Return the marker of a wheel that is a body of its own, fixed to its place on its shaft."""
-        where = {
+        where: dict[str, Any] = {
             "position": place.global_position(),
             "orientation": place.global_orientation(),
             "angular_velocity": angular_velocity,

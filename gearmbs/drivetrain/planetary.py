@@ -362,7 +362,7 @@ def check_stage(train: Drivetrain, stage: PlanetaryStage) -> None:
             "inertia, and leave it out here",
         )
         require(
-            member == "ring" or isinstance(part, Shaft) or part.model is None,
+            member == "ring" or not isinstance(part, Housing) or part.model is None,
             f"{stage.label}: {member} is on {part.label}, a model of finite elements or modes, which has a seat for a "
             "ring only; give 'ground', a rigid housing, or a shaft in that housing",
         )

@@ -23,8 +23,8 @@ from gearmbs.dae.equations.residual import residual
 from gearmbs.dae.model.elastic import elastic_frames
 from gearmbs.dae.model.evaluator import evaluate_rows
 from gearmbs.dae.model.fixed_axes import evaluate_axes
+from gearmbs.dae.model.kinetic import write_kinetic_energy
 from gearmbs.dae.model.members import expand
-from gearmbs.dae.results.kinetic import write_kinetic_energy
 from gearmbs.drivetrain.torque_element import LAW_SIG
 from gearmbs.kernels import cache
 from gearmbs.kernels.ahead import Report

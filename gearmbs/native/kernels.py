@@ -21,9 +21,9 @@ from gearmbs.dae.linalg.plan_lists import lists_of_plan
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, factor, solve
 from gearmbs.dae.model.elastic import elastic_frames
 from gearmbs.dae.model.evaluator import evaluate_rows
+from gearmbs.dae.model.kinetic import write_kinetic_energy
 from gearmbs.dae.model.members import expand
 from gearmbs.dae.problem import ModelError
-from gearmbs.dae.results.kinetic import write_kinetic_energy
 from gearmbs.kernels.bound import FUNCTIONS_TYPE, NAMES
 from gearmbs.kernels.jit import Kernel
 from gearmbs.kernels.kinds import float64, int64

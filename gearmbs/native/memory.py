@@ -21,10 +21,10 @@ from gearmbs.dae.linalg.left_out import signs_of_error
 from gearmbs.dae.linalg.lu_plan import NO_MODES, LUPlan, SingularMatrixError, analyse, new_lines
 from gearmbs.dae.linalg.sparse_lu import LUFactors, new_factors
 from gearmbs.dae.model.evaluator import Evaluator, new_records, pattern
+from gearmbs.dae.model.kinetic import inertias
 from gearmbs.dae.model.members import MemberEvaluator, Members
 from gearmbs.dae.model.records import Records
 from gearmbs.dae.problem import INPUT, DAEProblem, Number
-from gearmbs.dae.results.kinetic import inertias
 from gearmbs.kernels.bound import NAMES, SIGNATURES
 from gearmbs.kernels.lanes import LANES
 from gearmbs.mechanism.solve.told import Begun

@@ -8,10 +8,10 @@ from gearmbs.dae.equations import layout as T
 from gearmbs.dae.linalg.entry_lists import FEWEST_ENTRIES, LEAVING_PLANS, NEGLIGIBLE
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT
 from gearmbs.dae.model.evaluator import FIXED_TURNS, GENERIC_TURNS, evaluate_rows
+from gearmbs.dae.model.kinetic import write_kinetic_energy
 from gearmbs.dae.model.members import AXES_SIG, EDGE_COLUMNS, PLACE_COLUMNS, TURN_COLUMNS, Members, expand
 from gearmbs.dae.model.records import Records
 from gearmbs.dae.result import Status
-from gearmbs.dae.results.kinetic import write_kinetic_energy
 from gearmbs.kernels.jit import njit
 from gearmbs.kernels.pointers import caller
 from gearmbs.kernels.structs import IntVector, Matrix, Struct, Vector, matrix_at
@@ -62,7 +62,7 @@ class Teller(Struct):
         Values of the matrix of accelerations at the home of pivots, see `gearmbs.dae.problem.DAEProblem`; empty without
         one.
     bodies, modal, integrals : ndarray
-        Of `gearmbs.dae.results.kinetic.Inertias`.
+        Of `gearmbs.dae.model.kinetic.Inertias`.
     energy : ndarray, shape (1,)
         Kinetic energy, J.
     group, place, of_marker, row, edge, turn : ndarray

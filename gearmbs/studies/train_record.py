@@ -202,7 +202,8 @@ class TrainRecorder:
         The bore is on the shaft, and turns as its seat there does.
         """
         turned = part.deflection(f"{wheel}.I")[1][:, 2] if bends else np.zeros(part.t.size)
-        if self.train.part(wheel, Wheel).flexible is not None:
+        on = self.train.parts.get(wheel)
+        if isinstance(on, Wheel) and on.flexible is not None:
             turned = turned + (part.deflection(wheel)[1] - part.deflection(f"{wheel}.{BORE}")[1])[:, 2]
         return turned
 

@@ -16,8 +16,8 @@ import xarray as xr
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.loads.forces import DISSIPATED, STORED
 from gearmbs.dae.equations.rotation import KIN_A, KIN_R, KIN_V, KIN_W
+from gearmbs.dae.model.kinetic import kinetic_energy as energy_of_poses
 from gearmbs.dae.results.frames import Evaluated, frame_motion
-from gearmbs.dae.results.kinetic import kinetic_energy as energy_of_poses
 from gearmbs.wording import warn
 
 if TYPE_CHECKING:

@@ -250,7 +250,8 @@ def _mass(train: Drivetrain, housing: Housing) -> float:
 def _angles(train: Drivetrain) -> Iterator[str]:
     """Yield what is said of directions and angles of more than a turn."""
     given = [(mesh.label, "direction", mesh.direction) for mesh in train.meshes]
-    given += [(part.label, "angle", part.angle) for part in (*train.shafts, *train.wheels)]
+    given += [(shaft.label, "angle", shaft.angle) for shaft in train.shafts]
+    given += [(wheel.label, "angle", wheel.angle) for wheel in train.wheels]
     for label, name, angle in given:
         if angle is not None and abs(float(angle)) > TURNS:
             yield (

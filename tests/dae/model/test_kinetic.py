@@ -7,7 +7,7 @@ import numpy as np
 from gearmbs.dae.equations import layout as T
 from gearmbs.dae.equations.bodies.inertia import ModalInertia
 from gearmbs.dae.equations.rotation import POSE_A, POSE_COLUMNS, POSE_V, POSE_W
-from gearmbs.dae.results.kinetic import kinetic_energy
+from gearmbs.dae.model.kinetic import kinetic_energy
 
 
 def symmetric(random, *shape):
