@@ -40,6 +40,18 @@ def tracks(record, channels):
     return np.abs(found[0].speed.values) * 30.0 / np.pi, level
 
 
+def centre(speed, level, peak):
+    """Mean speed, rpm, over which a level is within 1 % of its peak.
+
+    A resonance is flat there to 0.1 % while the speed of a window of 1.5 turns swings by 0.7 %: which of these samples
+    is the highest hangs on the steps.
+    """
+    low = level < 0.99 * level[peak]
+    first = peak - np.argmax(low[peak::-1]) + 1
+    last = peak + np.argmax(low[peak:])
+    return speed[first:last].mean()
+
+
 @pytest.mark.slow
 def test_clear_peaks_of_a_run_up_stand_at_the_crossings_that_are_ranked_first():
     """Peaks of 6 dB and more in the tracks of tooth and bearing forces, from a tenth of the largest line on."""
@@ -56,7 +68,8 @@ def test_clear_peaks_of_a_run_up_stand_at_the_crossings_that_are_ranked_first():
             # between the slow parts the speed passes too fast for lines to follow
             slowly = (speed[peaks] < 770.0) | (speed[peaks] > 1330.0)
             for at in peaks[(level[peaks, k] > 0.1 * level.max()) & slowly]:
-                away = np.abs(speed[at] / first.speed_rpm - 1.0)
-                assert away.min() < 0.01, (channels, k + 1, speed[at])
+                stands = centre(speed, level[:, k], at)
+                away = np.abs(stands / first.speed_rpm - 1.0)
+                assert away.min() < 0.01, (channels, k + 1, stands)
                 met.add(int(away.idxmin()))
         assert met == set(first.index)
