@@ -22,11 +22,11 @@ from gearmbs.dae.equations.loads.forces import (
     Diagnostic,
 )
 from gearmbs.dae.problem import EPS, ModelError
-from gearmbs.kernels.jit import compilation_error, njit
+from gearmbs.kernels.jit import njit
 from gearmbs.kernels.kinds import numba_of, types
 from gearmbs.kernels.pointers import F8, MAT, VEC, address, caller
 from gearmbs.kernels.structs import matrix_at, vector_at
-from gearmbs.mechanism.forces.laws import LAW_DIAGNOSTICS, Derived, ForceLaw, derive_law
+from gearmbs.mechanism.forces.laws import LAW_DIAGNOSTICS, Derived, ForceLaw, derive_law, refusals
 from gearmbs.mechanism.parts.bodies import Marker
 from gearmbs.mechanism.parts.elements import Compiled, ForceElement, State
 
@@ -330,14 +330,6 @@ def _check_arguments(label: str, what: str, function: Any, expected: tuple[str, 
         ) from None
 
 
-def _refusals() -> tuple[type[Exception], ...]:
-    """Return what is raised of a function that cannot be compiled."""
-    import numba
-
-    # of a statement that numba does not know, as an import: none of its other errors
-    return compilation_error(), numba.UnsupportedBytecodeError, KeyError, TypeError, RuntimeError
-
-
 def _compiled(label: str, what: str, function: Any, signature: Any, expected: tuple[str, ...]) -> Any:
     """Return a function compiled for a signature; a division by zero gives no number and raises nothing."""
     python = getattr(function, "py_func", function)
@@ -347,7 +339,7 @@ def _compiled(label: str, what: str, function: Any, signature: Any, expected: tu
     try:
         dispatcher.compile(wanted.args)
         found = dispatcher.overloads[wanted.args].signature.return_type
-    except _refusals() as error:
+    except refusals() as error:
         lines = [line for line in str(error).splitlines() if line.strip()]
         text = "\n".join(lines[:8])
         outside = inspect.getclosurevars(python)

@@ -22,6 +22,7 @@ from gearmbs.dae.equations.loads.traced import Frame
 from gearmbs.dae.problem import ModelError
 from gearmbs.kernels import PLAIN, derive
 from gearmbs.kernels.derive import ONE, ZERO, Function, Value, derivative, inputs, product, tangent
+from gearmbs.kernels.jit import compilation_error
 from gearmbs.mechanism.parts.constraint_laws import tracing
 
 _numbers = itertools.count()
@@ -421,6 +422,14 @@ def derived_of(name: str, texts: tuple[str, ...], parameters: Mapping[str, float
     tree, space["f8"] = _Literals().visit(ast.parse(texts[2])), np.float64
     exec(compile(ast.fix_missing_locations(tree), "<law>", "exec"), space)
     return Derived(space["values"], space["derivatives"], space["by_parameters"], parameters, name, texts)
+
+
+def refusals() -> tuple[type[Exception], ...]:
+    """Return what is raised of a function that cannot be compiled."""
+    import numba
+
+    # of a statement that numba does not know, as an import: none of its other errors
+    return compilation_error(), numba.UnsupportedBytecodeError, KeyError, TypeError, RuntimeError
 
 
 def straightened(function: Callable) -> Callable:
