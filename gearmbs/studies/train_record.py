@@ -178,8 +178,9 @@ class TrainRecorder:
         for k, stage in enumerate(train.planetary_stages, start=count):
             turned[:, k], speed[:, k] = self._rocks(part, stage)
         twisted = np.zeros((m, len(on_shafts(train))))
+        carriers = {stage.carrier_name for stage in train.planetary_stages}
         for k, (wheel, shaft) in enumerate(on_shafts(train).items()):
-            if wheel in self.mechanism.bodies:
+            if wheel in self.mechanism.bodies and wheel not in carriers:
                 twisted[:, k] = self._of_a_wheel(part, wheel, bends=train.part(shaft, Shaft).bends)
             elif train.part(shaft, Shaft).bends:
                 twisted[:, k] = part.deflection(wheel)[1][:, 2]

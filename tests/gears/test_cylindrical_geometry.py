@@ -159,7 +159,7 @@ HELIX = {"helix_angle": "10 deg"}
         (lambda: PairGeometry(GearSpec(38, "2 mm"), GearSpec(-44, "2 mm")), "interference|foul"),
         (lambda: GearSpec(-30, "2 mm"), says("inside the base")),
         (lambda: GearSpec(-60, "2 mm", bore_radius="5 mm"), says("gear.bore_radius", "5.0000 mm", "internal")),
-        (lambda: GearSpec(60, "2 mm", rim_thickness="5 mm"), "rim_thickness"),
+        (lambda: GearSpec(60, "2 mm", rim_thickness="5 mm"), says("rim_thickness", "internal")),
         (lambda: GearSpec(60, "2 mm", helix_angle="50 deg"), "helix_angle is 50"),
         (lambda: GearSpec(60, "2 mm", hand="up"), "hand is 'up'"),
         (

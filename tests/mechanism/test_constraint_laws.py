@@ -290,7 +290,7 @@ def test_markers_are_told_apart():
         m.general_constraint("c", rod, i, same, parameters={"length": 1.0})
     with pytest.raises(ModelError, match=says("two bodies or more")):
         m.general_constraint("c", rod, i, one.marker(), parameters={"length": 1.0})
-    with pytest.raises(ModelError, match=says("an expression names them")):
+    with pytest.raises(ModelError, match=says("markers", "an expression")):
         m.general_constraint("c", "DX(tip)", i)
 
 
