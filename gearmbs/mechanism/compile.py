@@ -251,26 +251,33 @@ class _Compiler:
         if self._scope is None:
             m = self.mechanism
             markers: dict[int | str, int] = {}
+            several: set[str] = set()
             for body in (m.ground, *m.bodies.values()):
                 for marker in body.markers:
-                    markers[marker.name.upper()] = self.index(marker)
+                    index = self.index(marker)
+                    if marker.name.upper() in markers:
+                        several.add(marker.name.upper())
+                    # elements know their markers, whatever these are called
+                    markers[marker.name.upper()] = markers[_own(index)] = index
                     if marker.number is not None:
-                        markers[marker.number] = self.index(marker)
+                        markers[marker.number] = index
             forces: dict[tuple[str, int | str], tuple[int | str, int | str | None]] = {}
             aliases: set[tuple[str, int | str]] = set()
             for joint in m.joints.values():
                 keys = [(kind, _upper(joint.name)) for kind in REACTION_KINDS.get(joint.kind, ("joint", "jprim"))]
-                forces.update(dict.fromkeys(keys, (joint.i.name.upper(), joint.j.name.upper())))
+                forces.update(dict.fromkeys(keys, (_own(self.index(joint.i)), _own(self.index(joint.j)))))
                 aliases.update(keys[1:])
             absent: set[tuple[str, int | str, int]] = set()
             for load in m.elements.values():
                 if len(load.markers) == 2:
-                    forces[(load.kind, _upper(load.name))] = (load.i.name.upper(), load.j.name.upper())
+                    pair = _own(self.index(load.i)), _own(self.index(load.j))
+                    forces[(load.kind, _upper(load.name))] = pair
                     for base, there in ((0, load.has_force), (3, load.has_torque)):
                         if not there:
                             absent.add((load.kind, _upper(load.name), base))
             self._scope = Scope(
                 markers=markers,
+                several=frozenset(several),
                 marker_body=tuple(self.builder.marker_body),
                 variables={_upper(k): v for k, v in m.variables.items()},
                 states=frozenset(_upper(k) for k, s in m.states.items() if s.algebraic),
@@ -527,3 +534,8 @@ def _state_kind(state: State) -> int:
 
 def _upper(name: Any) -> Any:
     return name.upper() if isinstance(name, str) else name
+
+
+def _own(index: int) -> int:
+    """Return by what elements refer to a marker of the table: below zero, where nothing in an expression is."""
+    return -1 - index

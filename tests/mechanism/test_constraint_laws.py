@@ -294,6 +294,17 @@ def test_markers_are_told_apart():
         m.general_constraint("c", "DX(tip)", i)
 
 
+@pytest.mark.parametrize("place", ["g", "G"])
+def test_names_are_not_taken_over_by_later_markers(place):
+    """Expressions know markers by names, in which capitals do not count: one that two have is no name."""
+    m, one, two = two_bodies()
+    m.general_constraint("c", rod, one.marker(name="G"), two.marker(name="J"), parameters={"length": 0.6})
+    m.ground.marker((0.5, 0.0, 0.0), name=place)
+    for use in (m.compile, lambda: write_deck(m)):
+        with pytest.raises(ModelError, match=says("several markers", "G", "a name of its own")):
+            use()
+
+
 def test_choices_and_powers_of_numbers():
     def law(i, j, t, n=1.5):
         z = i.position(j)[2] + 1.0

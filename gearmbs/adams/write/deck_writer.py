@@ -147,6 +147,7 @@ class DeckNames:
         self.bodies: dict[int, int] = {}
         self.markers: dict[int, int] = {}
         self.marker_names: dict[str, int] = {}
+        self.several: set[str] = set()
         self.elements: dict[tuple[str, str], int] = {}
         self.kept = kept(mechanism)
         self.hidden = hidden(mechanism)
@@ -175,6 +176,8 @@ class DeckNames:
         for body in (m.ground, *m.bodies.values()):
             for marker in body.markers:
                 self.markers[id(marker)] = marker.number or next(fresh)
+                if marker.name.upper() in self.marker_names:
+                    self.several.add(marker.name.upper())
                 self.marker_names[marker.name.upper()] = self.markers[id(marker)]
         counts: dict[str, int] = {}
         for name, kind in self._kinds():
@@ -237,6 +240,10 @@ class DeckNames:
             table = {k: n for (kind, k), n in self.plants.items() if kind == PLANTS[call.name]}
         elif isinstance(arg, Name) and (call.name not in ELEMENT_FORCES or position > 0):
             table = self.marker_names
+            if key in self.several:
+                raise ModelError(
+                    f"{call.name}: several markers are called {key}, in capitals or not; give each a name of its own"
+                )
         return Number(float(table[key]), arg.at, table[key]) if key in table else arg
 
     def _element_call(self, call: Call) -> Call:

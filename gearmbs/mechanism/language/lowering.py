@@ -235,6 +235,8 @@ class Lowering:
         if ref not in self.scope.markers:
             known = [name for name in self.scope.markers if isinstance(name, str)]
             self.fail(f"there is no MARKER {ref}{did_you_mean(ref, known, before='; ')}", node.at)
+        if ref in self.scope.several:
+            self.fail(f"several markers are called {ref}, in capitals or not; give each a name of its own", node.at)
         return int(self.scope.markers[ref])
 
     def literal(self, call: Call, position: int, low: int, high: int, default: int | None = None) -> int:

@@ -152,6 +152,8 @@ class Scope:
     ----------
     markers : mapping of int or str to int
         Marker table index of every id and (upper-case) name.
+    several : set of str
+        Names, in capitals, that several markers have: an expression cannot name these.
     marker_body : sequence of int
         Row of the kinematics table of every marker.
     variables : mapping
@@ -182,6 +184,7 @@ class Scope:
     """
 
     markers: Mapping[Ref, int] = field(default_factory=dict)
+    several: frozenset[str] = frozenset()
     marker_body: Sequence[int] = ()
     variables: Mapping[Ref, str] = field(default_factory=dict)
     states: frozenset[Ref] = frozenset()
