@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -35,6 +35,11 @@ CONE_PIECES = 8
 DAMPING: Damping = ((10e3, 0.01), (50e3, 0.1), (math.inf, 1.0))
 """Damping ratios of modes by bands of frequency, Hz: 1 % where teeth excite, as flexible bodies have where nothing is
 said, and more for shapes that carry loads at seats, whose frequencies would hold the step of an integrator down."""
+
+FROM_MODEL = (
+    "radius", "diameter", "sections", "mass", "inertia", "density", "youngs_modulus", "poisson_ratio", "elements",
+)  # fmt: skip
+"""What a shaft with a model is not told."""
 
 GAUSS = np.polynomial.legendre.leggauss(3)
 """Places and weights: exact to the fifth power, and moments of cones have the fourth."""
@@ -176,8 +181,9 @@ class Shaft(Part):
         return {**room, **fields}
 
     def _read_model(self) -> None:
-        for name in ("radius", "diameter", "sections", "mass", "inertia"):
-            require(getattr(self, name) is None, f"{self.label}: {name} follows from model; leave it out")
+        usual = {one.name: one.default for one in fields(self)}
+        for name in FROM_MODEL:
+            require(getattr(self, name) == usual[name], f"{self.label}: {name} follows from model; leave it out")
         if isinstance(self.model, Mapping):
             # for a file
             object.__setattr__(self, "told", dict(self.model))
@@ -185,6 +191,11 @@ class Shaft(Part):
         chosen(("average", "rigid"), self.faces, f"{self.label}: ", DrivetrainError, "faces")
         with errors_named(f"{self.label}: model"):
             object.__setattr__(self, "model", body_source(self.model))
+        require(
+            self.faces == usual["faces"] or not isinstance(self.model, ModalModel),
+            f"{self.label}: faces is {self.faces!r}, and its model a body with modes, whose seats know how they move; "
+            "leave faces out",
+        )
         with errors_named(self.label):
             low, high = (
                 float(z) for z in (self.body_model.positions[:, 2].min(), self.body_model.positions[:, 2].max())
@@ -218,6 +229,10 @@ class Shaft(Part):
             not (self.seats and self.model is None),
             f"{self.label}: seats is given without model, whose nodes they are; leave it out",
         )
+        if not self.bends:
+            return
+        with errors_named(f"{self.label}: damping"):
+            damping_of(self.damping)
         if self.modes is None:
             return
         counted = isinstance(self.modes, int) and not isinstance(self.modes, bool) and self.modes >= 1
@@ -232,8 +247,6 @@ class Shaft(Part):
                 f"{self.label}: {name} is {getattr(self, name)} beside modes: a shaft that bends has the mass of its "
                 f"sections; leave {name} out, or modes",
             )
-        with errors_named(f"{self.label}: damping"):
-            damping_of(self.damping)
 
     def _section(self, given: Any) -> Any:
         """Return a section as length and radius, m, or as a `ShaftSection` if it has a bore or is a cone."""

@@ -161,6 +161,21 @@ def test_bodies_that_are_none_are_refused(body, words):
         Wheel(name="z2", shaft="lay", gear=GEAR, body=body)
 
 
+def test_models_that_do_not_go_round_the_axis_are_refused():
+    """A disc that stands across it, and one beside it."""
+    model, _ = FlexibleWheel.of(THIN)._of_dimensions("z2", GEAR)
+    across = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    for axes, at in ((across, 0.0), (np.eye(3), 0.005)):
+        with pytest.raises(ValueError, match=says("bore", "go round", "axis")):
+            FlexibleWheel(model=model.placed(axes, np.array([at, 0.0, 0.0]))).body("z2", GEAR)
+
+
+@pytest.mark.parametrize("idle", [{"around": 48}, {"faces": "average"}, {"rim": "100 mm"}])
+def test_what_a_body_with_modes_has_is_not_told_again(idle):
+    with pytest.raises(ValueError, match=says(*idle, "beside model")):
+        FlexibleWheel(model=FlexibleWheel.of({**THIN, "around": 8, "modes": 1}).body("z2", GEAR), **idle)
+
+
 def test_an_internal_wheel_has_no_web():
     ring = gm.GearSpec.ring(90, "3 mm")
     with pytest.raises(DrivetrainError, match=says("'r'", "internal", "rim_thickness")):

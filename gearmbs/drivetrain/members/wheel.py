@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -48,6 +48,10 @@ AROUND = 24
 
 NEAR = 1e-6
 """Distance from a face, by its radius, up to which a node is on it."""
+
+OPEN = 0.25 * 2.0 * math.pi * (1.0 + 1e-6)
+"""Largest angle between neighbours on a face, rad: four nodes go round, and those of a disc that stands across the axis
+leave almost half a turn open on both sides."""
 
 IN_SHAFT = "shaft"
 """What ``body`` says of a wheel that is cut from its shaft, whose mass is the shaft's."""
@@ -127,6 +131,10 @@ class FlexibleWheel(Described):
             _need(not told, f"body: {', '.join(told)} beside model; give one of them")
             with errors_named("body: model"):
                 object.__setattr__(self, "model", body_source(self.model))
+            own = ("around", "bore", "rim", "faces") if isinstance(self.model, ModalModel) else ("around",)
+            usual = {one.name: one.default for one in fields(self)}
+            idle = [name for name in own if getattr(self, name) != usual[name]]
+            _need(not idle, f"body: {', '.join(idle)} beside model, which has its own; leave it out")
         counted = isinstance(self.modes, int) and not isinstance(self.modes, bool) and self.modes >= 1
         _need(
             counted or self.modes in (None, ALL),
@@ -262,7 +270,19 @@ class FlexibleWheel(Described):
                 f"body: {int(inside.sum())} nodes of its model are those of the {label}, {told}; its nodes are "
                 f"{MM * across.min():.4g} to {MM * across.max():.4g} mm off the axis, z: check at, or give {label}",
             )
+            gap = _widest_gap(model.positions[inside])
+            _need(
+                gap <= OPEN,
+                f"body: nodes of its model that are those of the {label}, {told}, do not go round the axis, z: for "
+                f"{math.degrees(gap):.4g} deg there are none; give a model whose axis is z, or {label}",
+            )
         return model, [_seat(model, BORE, on_bore, self.faces), _seat(model, RIM, on_rim, "average")]
+
+
+def _widest_gap(positions: np.ndarray) -> float:
+    """Return the largest angle about z between neighbours of some nodes, rad."""
+    angles = np.sort(np.arctan2(positions[:, 1], positions[:, 0]))
+    return float(np.diff(angles, append=angles[0] + 2.0 * math.pi).max())
 
 
 def _ring(inner: float, outer: float, width: float, density: float) -> tuple[float, float, float, float]:
