@@ -104,6 +104,26 @@ def test_it_rests_as_a_shaft_by_sections(solid, cut):
     assert solid.power.on_driven("stage") == pytest.approx(300.0)
 
 
+def test_it_gives_way_as_a_beam_between_its_bearings(solid, cut):
+    """Under a lateral load at the wheel, by Timoshenko with Cowper's share of shear (J. Appl. Mech. 33, 1966)."""
+    modulus, poisson, hollow_by = 2.1e11, 0.3, (BORE / OUTER) ** 2
+    area, second = 0.25 * math.pi * (OUTER**2 - BORE**2), math.pi / 64.0 * (OUTER**4 - BORE**4)
+    whole = 6.0 * (1.0 + poisson) * (1.0 + hollow_by) ** 2
+    share = whole / ((7.0 + 6.0 * poisson) * (1.0 + hollow_by) ** 2 + (20.0 + 12.0 * poisson) * hollow_by)
+    a, b = 0.06, 0.14
+    bending = a**2 * b**2 / (3.0 * modulus * second * (a + b))
+    shearing = a * b / (a + b) / (share * modulus / (2.0 * (1.0 + poisson)) * area)
+    found = []
+    for one in (solid, cut):
+        body = one.modal_models["lay"]
+        at = {name: seat.moved[:, 0] for key, seat in body.seats.items() for name in key.split(", ")}
+        bent = at["z2"] - b / (a + b) * at["c"] - a / (a + b) * at["d"]
+        found.append(float(np.sum((bent / (2.0 * np.pi * body.frequencies)) ** 2)))
+    assert found[1] == pytest.approx(bending + shearing, rel=1e-6)
+    # what one layer of nodes does within a diameter
+    assert found[0] == pytest.approx(bending + shearing, abs=OUTER / (modulus * area))
+
+
 @pytest.mark.slow
 def test_wider_seats_are_stiffer(solid):
     """A wheel and bearings carry as wide as they are: what they do to a section is spread."""
