@@ -266,8 +266,13 @@ class FiniteElementModel:
         Raises
         ------
         FlexibleError
-            If a node lacks a direction, with which the others would have to be mixed.
+            If a node lacks a direction, with which the others would have to be mixed, and the axes are others.
         """
+        moved = replace(
+            self, positions=self.positions @ np.transpose(axes) + at, slices=None, outline=None, recovery=None
+        )
+        if np.array_equal(axes, np.eye(3)):
+            return moved
         nodes = np.flatnonzero(self.dofs[:, 0] >= 0)
         row_of = np.full((len(self.ids), 2, 3), -1)
         row_of[self.dofs[nodes, 0], self.dofs[nodes, 1] // 3, self.dofs[nodes, 1] % 3] = nodes
@@ -284,15 +289,7 @@ class FiniteElementModel:
         columns = np.concatenate([np.tile(three, 3).ravel(), others])
         values = np.concatenate([np.tile(np.ravel(axes), len(three)), np.ones(others.size)])
         turn = sp.csc_array((values, (rows, columns)), shape=self.stiffness.shape)
-        return replace(
-            self,
-            positions=self.positions @ np.transpose(axes) + at,
-            stiffness=turn @ self.stiffness @ turn.T,
-            mass=turn @ self.mass @ turn.T,
-            slices=None,
-            outline=None,
-            recovery=None,
-        )
+        return replace(moved, stiffness=turn @ self.stiffness @ turn.T, mass=turn @ self.mass @ turn.T)
 
     def field(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return displacements and rotations of the nodes for vectors of the degrees of freedom.

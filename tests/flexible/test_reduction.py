@@ -22,6 +22,7 @@ from gearmbs.flexible import (
 )
 from gearmbs.flexible.interfaces import resolve
 from gearmbs.flexible.reduction import of_lumps, of_mass_matrix
+from gearmbs.flexible.solid import revolved_mesh
 from gearmbs.mechanism import Mechanism, ShapeIntegrals, static_equilibrium
 from tests.flexible.test_files import cube
 from tests.says import says
@@ -264,3 +265,15 @@ def test_nodes_of_solids_among_shells_turn_with_their_neighbours():
     assert np.array_equal(moved, solid.moved[:, other])
     assert np.array_equal(turned, solid.shapes(solid.positions[other])[1])
     assert np.abs(turned).max() > 0.0
+
+
+def test_a_model_that_lacks_a_direction_is_shifted_and_not_turned():
+    whole = solid_model(revolved_mesh(np.array([0.005, 0.02]), np.linspace(0.0, 0.1, 3), 8))
+    left = np.arange(1, len(whole.dofs))
+    model = replace(
+        whole, dofs=whole.dofs[1:], stiffness=whole.stiffness[left][:, left], mass=whole.mass[left][:, left]
+    )
+    shifted = model.placed(np.eye(3), np.array([0.0, 0.0, 0.3]))
+    np.testing.assert_allclose(shifted.positions - model.positions, np.tile([0.0, 0.0, 0.3], (len(model.ids), 1)))
+    with pytest.raises(FlexibleError, match=says("lacks a direction", "axes")):
+        model.placed(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
