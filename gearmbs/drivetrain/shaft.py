@@ -13,7 +13,7 @@ import numpy as np
 from gearmbs.drivetrain.members.shaft_body import cylinders_of, placed_model
 from gearmbs.drivetrain.members.sources import ALL, axes_of, body_source
 from gearmbs.drivetrain.part import DrivetrainError, Part, errors_named, require
-from gearmbs.flexible import ElasticMaterial, ModalModel, ShaftSection
+from gearmbs.flexible import ElasticMaterial, FiniteElementModel, ModalModel, ShaftSection
 from gearmbs.flexible.shaft import ELEMENTS
 from gearmbs.schema.described import chosen
 from gearmbs.schema.quantities import Measure
@@ -217,7 +217,7 @@ class Shaft(Part):
         return self.modes is not None or self.model is not None
 
     @cached_property
-    def body_model(self) -> Any:
+    def body_model(self) -> FiniteElementModel | ModalModel:
         """Its finite elements, or its body with modes, in the frame of the shaft."""
         return placed_model(self)
 

@@ -43,7 +43,7 @@ class Width(NamedTuple):
     width: float | None
 
 
-def placed_model(shaft: Any) -> Any:
+def placed_model(shaft: Any) -> FiniteElementModel | ModalModel:
     """Return the model of a shaft in the shaft's frame.
 
     Raises
