@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 import platform
@@ -457,3 +458,22 @@ def test_symbols_have_the_same_names_in_all_processes():
     several = flags({"reassoc", "contract", "arcp", "nsz"})
     assert "arcp', 'contract', 'nsz', 'reassoc" in several.summary()
     assert several.get_mangle_string() != flags(True).get_mangle_string()
+
+
+@pytest.mark.parametrize("kept", ["", "5", "null", '["x", "y"]', "[1, 2, 3]", '{"a": 1, "b": 2, "c": 3}', None])
+def test_what_tells_the_processor_is_replaced_where_it_is_broken(kept, tmp_path, monkeypatch):
+    file = tmp_path / "target.json"
+    if kept is not None:
+        file.write_text(kept, encoding="utf-8")
+    monkeypatch.setattr(cache, "_target_file", lambda: file)
+    assert not cache.known()
+    found = cache._own_target.__wrapped__()
+    assert cache.known()
+    assert tuple(json.loads(file.read_text(encoding="utf-8"))) == found == cache._own_target()
+
+
+def test_a_folder_that_cannot_be_looked_into_keeps_nothing(tmp_path, monkeypatch):
+    """Of a name that is too long the system tells an error, as of a folder of somebody else's."""
+    monkeypatch.setattr(cache, "_target_file", lambda: tmp_path / ("x" * 300) / "target.json")
+    assert not cache.known()
+    assert cache._own_target.__wrapped__() == cache._own_target()

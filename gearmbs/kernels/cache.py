@@ -85,7 +85,7 @@ def option(name: str) -> str | None:
 
     Numba need not be imported for it: its settings are variables of the environment, unless there is a file of them.
     """
-    if "numba" not in sys.modules and not Path(SETTINGS_FILE).exists():
+    if "numba" not in sys.modules and not os.path.exists(SETTINGS_FILE):
         return os.environ.get(f"NUMBA_{name}") or None
     from numba.core import config
 
@@ -100,7 +100,7 @@ def _target_file() -> Path:
 
 def known() -> bool:
     """Return whether the own stages have been used here with this numba, or kernels came along that were made so."""
-    return SHIPPED.is_dir() or _target_file().exists()
+    return SHIPPED.is_dir() or _kept_target(_target_file()) is not None
 
 
 def know() -> None:
@@ -115,16 +115,27 @@ def _own_target() -> tuple[str, str, str]:
     LLVM tells them; what it has told stands in a file from then on, under a digest of all it depends on.
     """
     file = _target_file()
-    if "numba" not in sys.modules:
-        with contextlib.suppress(OSError, ValueError):
-            system, name, features = json.loads(file.read_text(encoding="utf-8"))
-            return system, name, features
+    kept = _kept_target(file)
+    if kept is not None and "numba" not in sys.modules:
+        return kept
     from numba.core.registry import cpu_target
 
     found: tuple[str, str, str] = cpu_target.target_context.codegen().magic_tuple()
-    if not file.exists():
+    if kept != found:
         _write_whole(file, json.dumps(found).encode())
     return found
+
+
+def _kept_target(file: Path) -> tuple[str, str, str] | None:
+    """Return what a file tells of the processor; None where it cannot be read, or is not what was written."""
+    try:
+        told = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    if not (isinstance(told, list) and [type(part) for part in told] == [str] * 3):
+        return None
+    system, name, features = told
+    return system, name, features
 
 
 def _surroundings() -> str:
@@ -193,7 +204,7 @@ def setting(processor: tuple[str, str] | None = None) -> str:
 
 def _options() -> list[tuple[str, Any]]:
     """Return numba's settings that change its code, where any is given."""
-    if not Path(SETTINGS_FILE).exists() and not any(f"NUMBA_{name}" in os.environ for name in OPTIONS):
+    if not os.path.exists(SETTINGS_FILE) and not any(f"NUMBA_{name}" in os.environ for name in OPTIONS):
         return []
     from numba.core import config
 
@@ -457,7 +468,7 @@ def _package(kernel: Any) -> str:
 def stored(kernel: Any, kind: str, args: tuple) -> bool:
     """Return whether an entry or part is on disk."""
     names = _names(kernel, kind, args)
-    return any((folder / name).exists() for name in names for folder in folders(_package(kernel)))
+    return any(os.path.exists(folder / name) for name in names for folder in folders(_package(kernel)))
 
 
 def load(kernel: Any, kind: str, args: tuple, rebuild: Callable) -> Any:
