@@ -166,7 +166,7 @@ def test_models_that_do_not_go_round_the_axis_are_refused():
     model, _ = FlexibleWheel.of(THIN)._of_dimensions("z2", GEAR)
     across = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     for axes, at in ((across, 0.0), (np.eye(3), 0.005)):
-        with pytest.raises(ValueError, match=says("bore", "go round", "axis")):
+        with pytest.raises(ValueError, match=says("bore", "axis")):
             FlexibleWheel(model=model.placed(axes, np.array([at, 0.0, 0.0]))).body("z2", GEAR)
 
 

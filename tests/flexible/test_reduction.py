@@ -275,5 +275,5 @@ def test_a_model_that_lacks_a_direction_is_shifted_and_not_turned():
     )
     shifted = model.placed(np.eye(3), np.array([0.0, 0.0, 0.3]))
     np.testing.assert_allclose(shifted.positions - model.positions, np.tile([0.0, 0.0, 0.3], (len(model.ids), 1)))
-    with pytest.raises(FlexibleError, match=says("lacks a direction", "axes")):
+    with pytest.raises(FlexibleError, match=says("lacks", "direction", "axes")):
         model.placed(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3))
