@@ -1,10 +1,12 @@
-"""Where the equations jump along a run, and by how much that moves its sensitivities.
+"""Where the equations jump along a run, or change within a part of a step, and what that does to its sensitivities.
 
-Where the rates jump by [y'] at a time t* that depends on the parameter, the sensitivities jump by -[y'] dt*/dp. This is
-not followed: it is measured, so that a derivative from which it is missing is refused. Nothing is known of the
-equations but their residual: along the polynomial of a step intervals are halved for as long as its fourth difference
-does not fade, which it does wherever the equations are continuous, with kinks, too. When the jump comes is then looked
-up beside the run, with unknowns and numbers moved along a sensitivity.
+Where the rates jump by [y'] at a time t* that depends on the parameter, the sensitivities jump by -[y'] dt*/dp. Where
+they change within a short time, as by a narrow STEP, no step may have a point there, and what is missing is nearly as
+much. Nothing is known of the equations but their residual: along the polynomial of a step intervals are halved for as
+long as its fourth difference does not fade. It does wherever the equations are continuous, with kinks, too: intervals
+that are small beside the steps lie about a jump, a narrow change, or a kink, of which only the first two have rates
+behind them that stay other ones. When they come is then looked up beside the run, with unknowns and numbers moved along
+a sensitivity.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from gearmbs.dae.problem import EPS
 from gearmbs.dae.result import lagrange_weights
 from gearmbs.dae.tangent_track import MOST, lane_of, slot_of
 from gearmbs.kernels.jit import njit
+from gearmbs.kernels.lanes import LANES
 
 SEEN = 1e-5
 """Part of the largest rate of an unknown, so far, from which on a jump of its rate is looked for. Less counts for as
@@ -34,6 +37,12 @@ SMALLER, MOVES = 1e-2, 6
 """Part of the move before, and number of moves, with which the time of a jump is looked up: it is to move by less than
 some steps, which are short at a jump. A difference of residuals at one has made sensitivities huge, so that these do
 not tell how far to move."""
+NARROW = 0.25
+"""Part of a step of the run up to which an interval is one of a change within a step."""
+BESIDE = 0.25
+"""Part of such a change that rates may change by in an interval as long before and behind it: a kink is none."""
+NOTED = 1e-3
+"""Part of the largest sensitivity so far that it moves at least to be gone through in points of its own."""
 WIDENED = 4.0
 """Ratio of one interval in which a moved jump is looked for to the one before."""
 
@@ -195,6 +204,9 @@ def look_for_jumps(functions, tr, plan, factors, k, steps, yp, idata, rdata, wor
     lows[0] = tr.times[steps] - APART * EPS * abs(tr.times[steps])
     highs[0] = tr.times[0] - APART * EPS * abs(tr.times[0])
     waiting, looks = 1, 0
+    narrow = NARROW * (tr.times[0] - tr.times[steps]) / steps
+    # adjacent intervals that are small, from late to early: none yet
+    begin, end, jumps = np.inf, np.inf, False
     while waiting > 0 and looks < LOOKS:
         waiting -= 1
         low, high = lows[waiting], highs[waiting]
@@ -209,10 +221,18 @@ def look_for_jumps(functions, tr, plan, factors, k, steps, yp, idata, rdata, wor
         looks += 1
         for i in range(n):
             difference[i] = seen[0, i] - 4.0 * seen[1, i] + 6.0 * seen[2, i] - 4.0 * seen[3, i] + seen[4, i]
-        if not _differs(tr, plan, factors):
-            continue
-        if high - low <= APART * EPS * abs(high) or waiting + 2 > DEEP:
-            _note(functions, tr, plan, factors, k, yp, low, high, idata, rdata, work)
+        fades = not _differs(tr, plan, factors)
+        last = high - low <= APART * EPS * abs(high) or waiting + 2 > DEEP
+        if fades or last:
+            if high - low <= narrow:
+                begin, end = low, high if begin == end else end
+            elif begin < end:
+                if not jumps:
+                    _note_narrow(functions, tr, plan, factors, k, yp, begin, end, idata, rdata, work)
+                begin, end, jumps = np.inf, np.inf, False
+            if not fades:
+                jumps = True
+                _note(functions, tr, plan, factors, k, yp, low, high, narrow, idata, rdata, work)
             continue
         middle = low + 0.5 * (high - low)
         lows[waiting], highs[waiting] = low, middle
@@ -222,46 +242,141 @@ def look_for_jumps(functions, tr, plan, factors, k, steps, yp, idata, rdata, wor
                 stack[3 * waiting + j, i] = seen[j, i]
                 stack[3 * (waiting + 1) + j, i] = seen[j + 2, i]
         waiting += 2
+    if begin < end and not jumps:
+        _note_narrow(functions, tr, plan, factors, k, yp, begin, end, idata, rdata, work)
     if by_ends and looks == 1:
         # what was seen over the ends of the steps and not between them is right at the last, of the step behind it
         tr.known = 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _note(functions, tr, plan, factors, k, yp, low, high, idata, rdata, work):
-    """Note what a jump moves the sensitivities by; leave the corrections before and behind it.
+def _note_narrow(functions, tr, plan, factors, k, yp, low, high, idata, rdata, work):
+    """Note what a change within some small intervals moves the sensitivities by, if it is one.
 
     Parameters
     ----------
     functions, tr, plan, factors, k, yp, idata, rdata, work
         As of `look_for_jumps`.
     low, high : float
-        Between which the equations jump.
+        Begin and end of the intervals, which about a change at the end of the steps may be part of it.
+    """
+    before, after, found = tr.first_seen, tr.last_seen, tr.seen_between
+    width = high - low
+    for _ in range(2):
+        _correction(functions, tr, plan, factors, k, low, yp, 0, 0.0, before, idata, rdata, work)
+        _correction(functions, tr, plan, factors, k, high, yp, 0, 0.0, after, idata, rdata, work)
+        told = _most_changed(tr)
+        change = after[told] - before[told]
+        if _size(tr, told, change) > 1.0:
+            _correction(functions, tr, plan, factors, k, low - width, yp, 0, 0.0, found, idata, rdata, work)
+            earlier = abs(found[told] - before[told])
+            _correction(functions, tr, plan, factors, k, high + width, yp, 0, 0.0, found, idata, rdata, work)
+            if max(earlier, abs(found[told] - after[told])) < BESIDE * abs(change):
+                break
+        low, high = low - width, high + width
+    else:
+        return
+    _note(functions, tr, plan, factors, k, yp, low, high, 0.0, idata, rdata, work)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _most_changed(tr):
+    """Return the unknown whose correction changes most, as a part of what is looked at."""
+    before, after, told = tr.first_seen, tr.last_seen, 0
+    for i in range(tr.scale.shape[0]):
+        if _size(tr, i, after[i] - before[i]) > _size(tr, told, after[told] - before[told]):
+            told = i
+    return told
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _delay(functions, tr, plan, factors, k, yp, low, high, told, p, idata, rdata, work):
+    """Return by how much later a change comes by one of a parameter, infinite where it need not come."""
+    by = MOST
+    for _ in range(MOVES):
+        by *= SMALLER
+        late = _moved(functions, tr, plan, factors, k, yp, low, high, told, p, by, idata, rdata, work)
+        late -= _moved(functions, tr, plan, factors, k, yp, low, high, told, p, -by, idata, rdata, work)
+        if np.isfinite(late):
+            break
+    if abs(late) <= 4.0 * APART * EPS * abs(high):
+        return 0.0
+    return late / (2.0 * by)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _note(functions, tr, plan, factors, k, yp, low, high, beside, idata, rdata, work):
+    """Note what a jump, or a narrow change, moves the sensitivities by; leave the corrections before and behind it.
+
+    Parameters
+    ----------
+    functions, tr, plan, factors, k, yp, idata, rdata, work
+        As of `look_for_jumps`.
+    low, high : float
+        Between which the equations jump, or change.
+    beside : float
+        Time before and behind that in which it is looked for again; 0 of a change, which is none that has to be crossed
+        lest derivatives were wrong.
     """
     before, after = tr.first_seen, tr.last_seen
     n = tr.scale.shape[0]
     _correction(functions, tr, plan, factors, k, low, yp, 0, 0.0, before, idata, rdata, work)
     _correction(functions, tr, plan, factors, k, high, yp, 0, 0.0, after, idata, rdata, work)
-    told = 0
-    for i in range(n):
-        if _size(tr, i, after[i] - before[i]) > _size(tr, told, after[told] - before[told]):
-            told = i
+    told = _most_changed(tr)
+    counts = False
     for p in range(tr.parameters):
-        by = MOST
-        late = np.inf
-        for _ in range(MOVES):
-            by *= SMALLER
-            late = _moved(functions, tr, plan, factors, k, yp, low, high, told, p, by, idata, rdata, work)
-            late -= _moved(functions, tr, plan, factors, k, yp, low, high, told, p, -by, idata, rdata, work)
-            if np.isfinite(late):
-                break
-        if abs(late) <= 4.0 * APART * EPS * abs(high):
+        delay = abs(_delay(functions, tr, plan, factors, k, yp, low, high, told, p, idata, rdata, work))
+        if delay == 0.0:
             continue
         for i in range(n):
-            moved = tr.watched[i] * abs(tr.gamma * (after[i] - before[i])) * abs(late) / (2.0 * by)
-            if moved > tr.lost[p, i]:
+            moved = tr.watched[i] * abs(tr.gamma * (after[i] - before[i])) * delay
+            if beside > 0.0 and moved > tr.lost[p, i]:
                 tr.lost[p, i] = moved
                 tr.lost_at[p] = high
+            counts |= moved > NOTED * tr.largest[LANES * (n * (p // LANES) + i) + p % LANES]
+    if counts and tr.changed < tr.changes.shape[0]:
+        tr.changes[tr.changed, 0], tr.changes[tr.changed, 1] = low - beside, high + beside
+        tr.changed += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cross(functions, tr, plan, factors, k, high, yp, idata, rdata, work):
+    """Take the sensitivities across a jump that comes right behind the newest point: they jump by -[y'] dt*/dp.
+
+    The last step was so short that the corrector's matrix is nearly that of the rates alone.
+
+    Parameters
+    ----------
+    functions, tr, plan, factors, k, yp, idata, rdata, work
+        As of `look_for_jumps`.
+    high : float
+        Right behind the jump.
+    """
+    before, after = tr.first_seen, tr.last_seen
+    n, low = tr.scale.shape[0], tr.times[0]
+    _correction(functions, tr, plan, factors, k, low, yp, 0, 0.0, before, idata, rdata, work)
+    _correction(functions, tr, plan, factors, k, high, yp, 0, 0.0, after, idata, rdata, work)
+    told = _most_changed(tr)
+    delays = np.zeros(tr.parameters)
+    seen = _size(tr, told, after[told] - before[told]) > 1.0
+    for p in range(tr.parameters):
+        delays[p] = _delay(functions, tr, plan, factors, k, yp, low, high, told, p, idata, rdata, work)
+        if not (seen and np.isfinite(delays[p])):
+            # it is not here, or only just comes
+            delays[p], tr.lost[p, told], tr.lost_at[p] = 0.0, np.inf, high
+        if delays[p] != 0.0:
+            tr.lost_at[p] = high
+    # what they change by in as long times before and behind is no part of it
+    for side in range(2):
+        begin, end = (low - (high - low), low) if side == 0 else (high, high + (high - low))
+        for t, sign in ((begin, 0.5), (end, -0.5)):
+            _correction(functions, tr, plan, factors, k, t, yp, 0, 0.0, tr.found, idata, rdata, work)
+            for i in range(n):
+                after[i] += sign * tr.found[i]
+    for p in range(tr.parameters):
+        for i in range(n):
+            # the corrector would move a rate by minus gamma times what it finds
+            tr.s[lane_of(tr, 0, p, i)] += tr.differential[i] * tr.gamma * (after[i] - before[i]) * delays[p]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

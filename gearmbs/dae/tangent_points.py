@@ -7,8 +7,9 @@ import numpy as np
 from gearmbs.dae.integrators.bdf import MAX_ORDER
 from gearmbs.dae.result import DenseOutput
 
-END_OF_STEP, AFRESH, SHORT = 1, 2, 4
-"""Flags of a point: it ends a step of the run; no point before it but the last counts; no step to it is too long."""
+END_OF_STEP, AFRESH, SHORT, JUMP = 1, 2, 4, 8
+"""Flags of a point: it ends a step of the run; no point before it but the last counts; no step to it is too long; the
+equations jump between the point before and this one, which has the same time but for rounding."""
 GROWTH, GROWING_ORDER = 1.4, 3
 """Ratio of a step to the one before it, and order, with which steps grow behind a restart: for ever at this ratio the
 formula of order three is stable up to 1.53, that of order four up to 1.28."""

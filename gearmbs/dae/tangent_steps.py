@@ -13,8 +13,8 @@ from gearmbs.dae.linalg.several import solve_lanes
 from gearmbs.dae.linalg.sparse_lu import FACTORS_TYPE, factor, solve
 from gearmbs.dae.problem import EPS, HISTORY_CHANGED
 from gearmbs.dae.result import lagrange_weights
-from gearmbs.dae.tangent_jumps import look_for_jumps
-from gearmbs.dae.tangent_points import AFRESH, END_OF_STEP, SHORT
+from gearmbs.dae.tangent_jumps import cross, look_for_jumps
+from gearmbs.dae.tangent_points import AFRESH, END_OF_STEP, JUMP, SHORT
 from gearmbs.dae.tangent_track import BY, TRACK_TYPE, group_at, groups, lane_of, size_of_move, slot_of
 from gearmbs.kernels.bound import unbound
 from gearmbs.kernels.jit import njit
@@ -478,8 +478,7 @@ def _change_coordinates(functions, tr, t, rdata, work):
                 tr.rows[j * width + 2 + 2 * p, i] = before[i] - moved
     for i in range(tr.old.shape[0]):
         tr.table[i] = tr.old[i]
-    # what it counts in the table of numbers is counted already
-    numbers = rdata.copy()
+    numbers = rdata.copy()  # in which it has counted already
     functions.hook(t, tr.rows, past * width, tr.table, numbers, work)
     for j in range(past):
         for p in range(count):
@@ -501,8 +500,7 @@ def _begin_afresh(tr):
 
     They may jump where a run starts afresh, and be impulses in a start that was repaired.
     """
-    n = tr.scale.shape[0]
-    for i in range(n):
+    for i in range(tr.scale.shape[0]):
         if tr.differential[i] == 0.0:
             tr.y[1, i] = tr.y[0, i]
             tr.before[slot_of(tr, 1), i] = tr.y[0, i]
@@ -534,7 +532,7 @@ def follow_run(
     times, looked : ndarray, shape (m,)
         Times of the points, and where the equations are looked at: before a jump.
     orders, flags : ndarray of int64, shape (m,)
-        Orders of the formula at most; `END_OF_STEP` and `AFRESH`.
+        Orders of the formula at most; `END_OF_STEP`, `AFRESH` and `JUMP`.
     y, yp : ndarray, shape (m, n)
         The run there.
     outputs, s_out, sp_out : ndarray
@@ -545,6 +543,12 @@ def follow_run(
     functions, alone = unbound(bound), unbound(of_elements)
     n, history, before, left, rates = tr.scale.shape[0], tr.y, tr.before, tr.left, tr.rates
     for m in range(start, times.shape[0]):
+        if flags[m] & JUMP != 0:
+            cross(functions, tr, plan, factors, min(orders[m], tr.n_past - 1), times[m], yp[m], idata, rdata, work)
+            tr.times[0] = times[m]
+            history[0] = y[m]
+            before[slot_of(tr, 0)] = y[m]
+            continue
         afresh = flags[m] & AFRESH != 0
         if afresh:
             tr.n_past = 1

@@ -85,7 +85,9 @@ class Track(Struct):
     lost : ndarray, shape (p, n)
         Largest jump of each sensitivity that has not been followed.
     lost_at : ndarray, shape (p,)
-        When the last of them was, s.
+        When the last of them was, or that was crossed, s.
+    changes : ndarray, shape (m, 2)
+        Between which times, s, the equations jump, or change within a part of a step, and that moves sensitivities.
     """
 
     parameters: int
@@ -100,6 +102,7 @@ class Track(Struct):
     limited: bool  # whether local errors may be too large
     jumps: bool  # are looked for
     unseen: int  # steps that were not yet looked at
+    changed: int  # rows of the table of changes
     known: int  # newest points of which residual and rates are known
     owner_place: int  # where the number of an element stands in the table of integers
     owner_rest: int  # what stands there otherwise
@@ -161,6 +164,7 @@ class Track(Struct):
     last_seen: Vector
     lost: Matrix
     lost_at: Vector
+    changes: Matrix
 
 
 TRACK_TYPE = Track.numba_type

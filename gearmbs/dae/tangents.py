@@ -35,8 +35,9 @@ from gearmbs.dae.linalg.several import has_lanes
 from gearmbs.dae.linalg.sparse_lu import GROWTH_LIMIT, factor, new_factors
 from gearmbs.dae.problem import EPS, DAEProblem, ModelError
 from gearmbs.dae.result import DAEResult
+from gearmbs.dae.tangent_changes import carried_on, halts, narrowed, through_changes, together, unresolved
 from gearmbs.dae.tangent_jumps import DEEP
-from gearmbs.dae.tangent_points import AFRESH, END_OF_STEP, SHORT, points_of, shorter
+from gearmbs.dae.tangent_points import AFRESH, END_OF_STEP, JUMP, SHORT, points_of, shorter
 from gearmbs.dae.tangent_steps import follow_run
 from gearmbs.dae.tangent_track import BY, Track
 from gearmbs.kernels.lanes import LANES
@@ -65,12 +66,15 @@ NO_SOLUTION = (
     "end the run before it"
 )
 JUMPS = (
-    "parameter {!r}: at t = {:.6g} s the equations jump, at a time that depends on it, and its derivatives with them, "
-    "which is not followed; let what jumps take a width (STEP), or a time that does not depend on the parameter"
+    "parameter {!r}: at t = {:.6g} s the equations jump, or change as if they did, at a time that depends on it, "
+    "and its derivatives with them. This is not followed where they only just come to it, or again and again; let what "
+    "jumps take a larger width (STEP), or a time that does not depend on the parameter"
 )
 JUMP_COUNTS = 1e-3
 """Part of the largest sensitivity of an unknown by which a jump that is not followed may falsify it: what the steps
 leave of it is as much."""
+MANY = 1024
+"""Jumps and narrow changes that are gone through in points of their own, fewer than that."""
 SCRATCH = (
     "plus", "minus", "other", "terms", "row_scale", "yp_moved", "between", "found", "most_rate", "first_seen",
     "seen_between", "last_seen",
@@ -137,7 +141,8 @@ def follow(
     longest : float
         Longest step that the run was allowed, s.
     jumps : bool
-        Whether jumps are looked for, which takes as long as all the rest with few directions. Without, what they add
+        Whether jumps, and changes that are narrow beside the run's steps, are looked for and crossed, which takes as
+        long as all the rest with few directions. Without, what they add
         is missing in silence: for matrices whose worth shows by itself, as Newton's.
     local_error : float, optional
         Local error of a step that is allowed, as in `Followed`: where it is larger at the steps of the run these are
@@ -146,17 +151,34 @@ def follow(
     Raises
     ------
     ModelError
-        If the equations for the sensitivities have no unique solution; if these jump, which is not followed.
+        If the equations for the sensitivities have no unique solution; if they jump and the run only just comes to
+        that, or does so again and again.
     """
     assert result.sol is not None
-    points = points_of(result.sol, longest)
-    first = _Following(problem, result, directions, jumps)
-    followed = first.through(*points)
-    for p, (direction, largest) in enumerate(zip(directions, first.each(first.tr.largest), strict=True)):
-        # what does not change has its rounding beside it
-        least = BY * (largest / first.tr.scale).max() * first.tr.scale
-        if (first.tr.lost[p] > JUMP_COUNTS * np.maximum(largest, least)).any():
-            raise ModelError(JUMPS.format(direction.name, first.tr.lost_at[p]))
+    whole = points = points_of(result.sol, longest)
+    changes = np.zeros((0, 3))
+    alike: tuple[_Following, Followed] | None = None
+    for attempt in range(AGAIN):
+        first = _Following(problem, result, directions, jumps)
+        followed = first.through(*points)
+        missing = first.missing(directions)
+        if alike is not None and not first.tr.lost_at.any():
+            # all that was crossed comes at times of its own
+            first, followed, points = *alike, whole
+            break
+        places = first.tr.changes[: first.tr.changed]
+        if jumps and attempt == 0:
+            ends = whole[0][whole[2] & END_OF_STEP != 0]
+            places = np.concatenate([places, halts(first.run.t_min, ends)])
+        before, changes = len(changes), together(changes, unresolved(first.narrowed(places), first.run.t_min, whole[0]))
+        if not missing and len(changes) == before:
+            break
+        # too many, as of what rattles at a jump, or none that was not gone through
+        if attempt == AGAIN - 1 or not before < len(changes) < MANY:
+            raise ModelError(missing)
+        points = through_changes(first.run.t_min, *whole, changes)
+        all_jump = np.count_nonzero(points[2] & JUMP) == len(changes)
+        alike = (first, followed) if attempt == 0 and not missing and all_jump else None
     if local_error is None or not (followed.error > local_error).any():
         return followed
     found, most = followed, first.most
@@ -192,6 +214,31 @@ class _Following:
         self.plan: Any = None
         self.factors: Any = None
 
+    def missing(self, directions: list[Direction]) -> str:
+        """Return what is said of a jump that is not in the sensitivities and counts; empty where none is."""
+        for p, (direction, largest) in enumerate(zip(directions, self.each(self.tr.largest), strict=True)):
+            # what does not change has its rounding beside it
+            least = BY * (largest / self.tr.scale).max() * self.tr.scale
+            if (self.tr.lost[p] > JUMP_COUNTS * np.maximum(largest, least)).any():
+                return JUMPS.format(direction.name, self.tr.lost_at[p])
+        return ""
+
+    def narrowed(self, places: np.ndarray) -> np.ndarray:
+        """Return when the jumps and narrow changes begin and end that are at some places, as `narrowed` does."""
+
+        problem, goes_on = self.problem, self.tr.differential > 0.0
+
+        def residual(t: float, end: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+            out, t = np.zeros(problem.n), min(max(t, self.run.t_min), float(self.outputs[-1]))
+            # others jump with the equations, and in the run change over a step
+            y = np.where(goes_on, self.run.evaluate(np.array([t]))[0], end[0])[0]
+            problem.residual(t, y, end[1][0], out, *self.tables)
+            return out * self.tr.row_scale
+
+        ends = [self.run.evaluate(np.array([high])) for high in places[:, 1]]
+        every = [narrowed(lambda t, end=end: residual(t, end), *one) for one, end in zip(places, ends, strict=True)]
+        return np.array([one for one in every if one is not None]).reshape(-1, 3)
+
     @property
     def most(self) -> np.ndarray:
         """Largest sensitivity of unknowns under error control, as part of their typical magnitudes, by parameter."""
@@ -211,6 +258,10 @@ class _Following:
         for begin in range(0, times.size, CHUNK):
             points = [np.ascontiguousarray(a[begin : begin + CHUNK]) for a in (times, looked, orders, flags)]
             y, yp = self.run.evaluate(points[0])
+            for jump in np.flatnonzero(flags & JUMP):
+                places, *there = carried_on(self.run.evaluate, times, flags, int(jump))
+                inside = (places >= begin) & (places < begin + CHUNK)
+                y[places[inside] - begin], yp[places[inside] - begin] = (one[inside] for one in there)
             largest = np.maximum(largest, np.abs(y).max(axis=0))
             at = 0
             while at < y.shape[0]:
@@ -302,6 +353,7 @@ def _track(problem: DAEProblem, directions: list[Direction], jumps: bool) -> Tra
         limited=False,
         jumps=jumps,
         unseen=0,
+        changed=0,
         known=0,
         owner_place=problem.alone.place if problem.alone is not None else 0,
         owner_rest=problem.alone.rest if problem.alone is not None else 0,
@@ -346,6 +398,7 @@ def _track(problem: DAEProblem, directions: list[Direction], jumps: bool) -> Tra
         looked_at=np.zeros((5, n)),
         lost=np.zeros((count, n)),
         lost_at=np.zeros(count),
+        changes=np.zeros((MANY, 2)),
         **{name: np.zeros(n) for name in SCRATCH},
         **{name: np.zeros(HISTORY + 1) for name in ("value", "slope", "nodes")},
     )

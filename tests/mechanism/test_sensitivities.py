@@ -211,23 +211,64 @@ def pushed(law, **numbers):
     return made
 
 
+def crossings(force, more, place, t):
+    """Place of what is pushed by ``force``, and by ``more`` beyond a place, piece by piece in closed form."""
+    x, at, start, speed, beyond = np.zeros_like(t), 0.0, 0.0, 0.0, 0
+    while at < t[-1]:
+        rest = (force + more * beyond) / 200.0
+        a, b = start - rest, 0.1 * speed
+        size, phase = np.hypot(a, b), np.arctan2(b, a)
+        turn = np.arccos((place - rest) / size)
+        comes = (phase + np.array([-turn, turn])[:, None] + 2.0 * np.pi * np.arange(-2, 3)) / 10.0
+        last = comes[comes > 1e-9].min()
+        inside = (t >= at) & (t <= at + last)
+        x[inside] = rest + a * np.cos(10.0 * (t[inside] - at)) + b * np.sin(10.0 * (t[inside] - at))
+        start, speed = place, 10.0 * (b * np.cos(10.0 * last) - a * np.sin(10.0 * last))
+        at, beyond = at + last, 1 - beyond
+    return x
+
+
+def by_place(t, place, more):
+    return (crossings(4.0, more, place + 1e-7, t) - crossings(4.0, more, place - 1e-7, t)) / 2e-7
+
+
 JUMPING = {
-    "a time": ("IF(TIME-{when}: 0, 0, 7)", {"when": 0.5}, {}),
-    "a time at a breakpoint": ("IF(TIME-{when}: 0, 0, 7)", {"when": 0.5}, {"breakpoints": [0.5]}),
-    "a place": ("4+IF(DX(place)-{place}: 0, 0, 1)", {"place": 0.01}, {}),
-    "a small one at a place": ("4+IF(DX(place)-{place}: 0, 0, 0.001)", {"place": 0.02}, {}),
-    "a place that comes later": ("{size}+IF(DX(place)-0.01: 0, 0, 1)", {"size": 4.0}, {}),
-    "a speed": ("IF(VX(place)-{rate}: 1, 1, 2)", {"rate": 0.02}, {}),
-    "an impact": ("{size}-IMPACT(-DX(place), -VX(place), -0.01, 1E5, 1.5, 50, 0)", {"size": 4.0}, {}),
+    "a time": ("IF(TIME-{p}: 0, 0, 7)", 0.5, {}, lambda t: np.where(t > 0.5, -0.35 * np.sin(10.0 * t - 5.0), 0.0)),
+    "a time at a breakpoint": (
+        "IF(TIME-{p}: 0, 0, 7)",
+        0.5,
+        {"breakpoints": [0.5]},
+        lambda t: np.where(t > 0.5, -0.35 * np.sin(10.0 * t - 5.0), 0.0),
+    ),
+    "a place": ("4+IF(DX(place)-{p}: 0, 0, 1)", 0.01, {}, lambda t: by_place(t, 0.01, 1.0)),
+    "a narrow STEP": ("4+STEP(DX(place)-{p}, -1E-8, 0, 1E-8, 1)", 0.013, {}, lambda t: by_place(t, 0.013, 1.0)),
+    "a small narrow STEP": (
+        "4+STEP(DX(place)-{p}, -1E-8, 0, 1E-8, 0.01)",
+        0.013,
+        {},
+        lambda t: by_place(t, 0.013, 0.01),
+    ),
 }
 
 
+@pytest.mark.parametrize("tol", [1e-6, 1e-8])
 @pytest.mark.parametrize("law", JUMPING)
-def test_jumps_that_depend_on_the_parameter_are_refused(law):
-    text, values, options = JUMPING[law]
-    (name,) = values
-    with pytest.raises(ModelError, match=says(f"'{name}'", "jump", "STEP")):
-        forward_sensitivities(lambda **p: pushed(text, **p), values, 1.5, rate=100, **options)
+def test_jumps_that_depend_on_the_parameter_are_crossed(law, tol):
+    """By where or when: up to five of them, and STEPs that are passed between two steps."""
+    text, value, options, exact = JUMPING[law]
+    run = forward_sensitivities(lambda p: pushed(text, p=p), {"p": value}, 1.5, rate=100, tol=tol, **options)
+    wanted = exact(run.solution.t)
+    assert np.abs(run.derivative("p", "DX(place)") - wanted).max() < 1e-3 * np.abs(wanted).max()
+
+
+def test_a_jump_by_what_comes_before_it_is_crossed():
+    """A harder push reaches the place earlier; against differences of closed forms."""
+    run = forward_sensitivities(
+        lambda size: pushed("{size}+IF(DX(place)-0.01: 0, 0, 1)", size=size), {"size": 4.0}, 1.5, rate=100, tol=1e-8
+    )
+    t = run.solution.t
+    wanted = (crossings(4.0 + 1e-6, 1.0, 0.01, t) - crossings(4.0 - 1e-6, 1.0, 0.01, t)) / 2e-6
+    assert run.derivative("size", "DX(place)") == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("options", [{}, {"breakpoints": [0.5]}], ids=["no breakpoint", "breakpoint"])
@@ -274,8 +315,11 @@ def test_jumps_inside_functions_of_python_are_seen():
         made.function("onoff", jump_of_python)
         return made
 
-    with pytest.raises(ModelError, match=says("'edge'", "jump")):
-        forward_sensitivities(build, {"edge": 0.02}, 1.0, rate=100)
+    run = forward_sensitivities(build, {"edge": 0.02}, 1.0, rate=100, tol=1e-8)
+    wanted = (
+        crossings(5.0, -1.0, 0.02 + 1e-7, run.solution.t) - crossings(5.0, -1.0, 0.02 - 1e-7, run.solution.t)
+    ) / 2e-7
+    assert run.derivative("edge", "DX(place)") == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
     assert forward_sensitivities(build, {"edge": 0.2}, 1.0, rate=100).solution.result.success
 
 
