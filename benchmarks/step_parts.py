@@ -18,6 +18,7 @@ from gearmbs.dae.integrators.options import Options
 from gearmbs.dae.integrators.run_state import rows_from
 from gearmbs.dae.linalg.sparse_lu import factor, solve
 from gearmbs.dae.problem import DAEProblem
+from gearmbs.kernels.placed import unbound
 from gearmbs.studies import Case, simulate_case
 
 TITLE = "Parts of a step"
@@ -30,13 +31,15 @@ CALLS = 300
 
 
 @njit
-def _residuals(n, functions, st):
+def _residuals(n, bound, st):
+    functions = unbound(bound)
     for _ in range(n):
         functions.residual(st.t, st.y, st.yp, st.res, st.idata, st.rdata, st.work)
 
 
 @njit
-def _jacobians(n, functions, st):
+def _jacobians(n, bound, st):
+    functions = unbound(bound)
     for _ in range(n):
         functions.jacobian(st.t, st.y, st.yp, st.gamma, st.jac, st.idata, st.rdata, st.work)
 
@@ -54,7 +57,8 @@ def _substitutions(n, st, plan, factors):
 
 
 @njit
-def _hooks(n, functions, st):
+def _hooks(n, bound, st):
+    functions = unbound(bound)
     for _ in range(n):
         functions.hook(st.t, rows_from(st, 0), st.n_past, st.idata, st.rdata, st.work)
 
