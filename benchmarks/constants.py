@@ -34,7 +34,7 @@ MODULES = ("bdf", "controller", "corrector", "driver", "initial_state", "newton_
 """Those that choose steps, orders and when a corrector ends; what the others hold is rounding, or tells failures."""
 LEFT_OUT = {
     "corrector": {"HELD", "ROUNDED_TERMS", "SETTLED_RATE", "GOLDEN_FRACTION"},
-    "controller": {"START_TARGET", "START_GROWTH"},
+    "controller": {"START_TARGET", "START_GROWTH", "UNFORESEEN"},
     "driver": {
         *("LEAST_DIGITS", "HOPELESS_DIGITS", "UNSATISFIED"),
         # of runs that get nowhere

@@ -30,17 +30,22 @@ most, too. The error of a step that stays as it is exceeds its target by less th
 SHRINK_AT_MOST = 0.5
 """Smallest ratio of the step after an accepted one to it, as in DASSL and IDA."""
 FAIL_SHRINK = (0.1, 0.8)
+UNFORESEEN = 0.6
+"""Local error of an accepted step, in tolerances, that differences have not foretold: three times what steps aim at,
+where one that stays as it is exceeds that by less than a factor 2.1. Of pendulums, linkages and tops at 1e-5 and 1e-8
+one step of 5 900 has it, and three of 842 of Andrews's squeezer; of lines of 1 to 30 meshes one in 18 to 50."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def meets_kinks(st):
-    """Return whether derivatives of the solution seem to jump, as at contacts: steps have been refused lately.
+    """Return whether derivatives of the solution seem to jump, as at contacts: errors have not been foretold lately.
 
     Where they are continuous, the differences foretell the error of the next step, and hardly one in a thousand is
     refused; where they jump, no difference knows of it before, and the step that meets the jump is refused. Jumps come
-    in groups, and few steps lie between them.
+    in groups, and few steps lie between them. Of many contacts the steps are so short that most jumps pass the error
+    test: an error beyond `UNFORESEEN` soon after a refused step, or another one, counts as one.
     """
-    return st.since_refused < KINK_MEMORY
+    return st.since_kink < KINK_MEMORY
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

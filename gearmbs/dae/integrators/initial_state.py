@@ -149,7 +149,7 @@ def initial_state(problem: DAEProblem, options: Options, outputs: np.ndarray, t_
     st.t = t0
     st.order = 1
     st.worst_row = st.jumped = st.pole = st.leapt = st.turned = st.answered = -1
-    st.since_refused = KINK_MEMORY
+    st.since_kink = KINK_MEMORY
     st.n_past = 1
     st.gamma_factored = 1.0
     st.left_out = problem.small_entries

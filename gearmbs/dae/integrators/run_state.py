@@ -157,7 +157,7 @@ class RunState(Struct):
     rate_before: float  # before the jump
     blocks: int  # blocks of points tried behind it, see `restart.take_block`
     h_block: float  # distance of the points of the next one
-    since_refused: int  # steps since the error test refused one
+    since_kink: int  # steps since one that was refused, or had an error not foretold; see `controller.meets_kinks`
     turned: int  # place of the input whose line has turned last, -1 for none
     turn_moves: float  # tolerances that points move by for a turn of one, at the reach of the points then
     turn_reach: float

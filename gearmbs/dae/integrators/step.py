@@ -14,7 +14,7 @@ from gearmbs.dae.integrators import bdf
 from gearmbs.dae.integrators import run_state as s
 from gearmbs.dae.integrators.algebraic.part import PART_TYPE
 from gearmbs.dae.integrators.branches import is_lost, keeps_its_index, kept_its_index, passes_pole, stays_on_branch
-from gearmbs.dae.integrators.controller import after_error_failure, after_start, after_success
+from gearmbs.dae.integrators.controller import UNFORESEEN, after_error_failure, after_start, after_success, meets_kinks
 from gearmbs.dae.integrators.corrector import (
     CONVERGED,
     NOT_FINITE,
@@ -372,7 +372,7 @@ def refuse_by_error(st):
     st.error_rejections += 1
     if step_before_jump(st):
         return
-    st.since_refused = 0
+    st.since_kink = 0
     st.error_fails += 1
     st.worst = weighted_argmax(st.delta, st.w_error)
     st.worst_error = st.worst
@@ -401,7 +401,7 @@ def accept(st):
             if st.differential[i] == 0.0:
                 start[i] = st.y[i]
     st.steps += 1
-    st.since_refused += 1
+    st.since_kink = 0 if st.error > UNFORESEEN and meets_kinks(st) else st.since_kink + 1
     st.passing = False
     st.open = False
     st.matrix_fresh = False

@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 
 from gearmbs.dae.integrators import bdf, newton_matrix, run_state, step
-from gearmbs.dae.integrators.controller import after_success, meets_kinks
+from gearmbs.dae.integrators.controller import UNFORESEEN, after_success, meets_kinks
 from gearmbs.dae.integrators.corrector import (
     CONVERGED,
     LOOSEST,
@@ -339,6 +339,20 @@ def test_weights_that_depend_on_nothing_are_left_alone():
     st.w_error[:] = 7.0
     renew_weights(st, st.y, 1e-3)
     assert (st.w_error == 7.0).all()
+
+
+@pytest.mark.slow
+def test_an_error_that_was_not_foretold_counts_as_a_kink_soon_after_another():
+    st = opened(warm())
+    st.error = 1.1 * UNFORESEEN
+    step.accept(st)
+    assert not meets_kinks(st)
+    st.since_kink = KINK_MEMORY - 1
+    step.accept(st)
+    assert st.since_kink == 0
+    st.error = 0.9 * UNFORESEEN
+    step.accept(st)
+    assert st.since_kink == 1
 
 
 @pytest.mark.slow
