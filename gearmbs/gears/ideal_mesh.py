@@ -56,6 +56,8 @@ class IdealMesh(Written):
     """A gear pair that meshes through one spring and damper along its line of action.
 
     It takes the place of a `GearPair` in ``Mechanism.gear_contact`` and in planetary sets.
+    One line of action has no stiffness against the tilting of wheels, which faces of some width have: two modes of
+    shafts that tilt in their bearings are 4 and 5 % lower than with teeth in contact, in a gearbox of 5 MW.
 
     Parameters
     ----------
